@@ -59,7 +59,7 @@ _TCP_INFO = struct.Struct("=200xQ")
 class Silent:
     """Serves nothing."""
 
-    def serve(self, errand: IncomingCall) -> Any:
+    def serve(self, incoming: IncomingCall) -> Any:
         return {}
 
     def notice(self, *_: Any) -> None: ...

@@ -110,7 +110,7 @@ class ThreadCalling:
         return took_s
 
     async def at_once(self, calls: int) -> None:
-        """Each caller in a thread of its own."""
+        """Make the calls from `IN_FLIGHT` threads at a time."""
         with ThreadPoolExecutor(IN_FLIGHT) as threads:
             for done in [threads.submit(self._call) for _ in range(calls)]:
                 done.result()

@@ -27,7 +27,7 @@ from benchmarks import measuring
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import lexicon
-from nondum_speech.recogniser import FreeHearing, Heard, Recogniser
+from nondum_speech.recogniser import FreeHearing, Recogniser, Recognition
 from nondum_speech.sentences import sentences_of
 from nondum_speech.settings import Settings
 from nondum_speech.sound import Sound, read_wav
@@ -132,7 +132,7 @@ class Result:
     """What a clip was heard as."""
 
     clip: Clip
-    heard: Heard
+    heard: Recognition
     cpu_s: float
 
     def is_right(self, threshold: float) -> bool:

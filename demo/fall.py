@@ -56,7 +56,7 @@ class Fall:
 
     def faults(self, actions: Collection[str], components: Collection[str]) -> Iterator[str]:
         """What is wrong with it, if `actions` had to go down together, and the behaviours of
-        `components` had to end of their own accord."""
+        `components` had to end by themselves."""
         if not self.ticks:
             yield "nothing was halted"
         else:

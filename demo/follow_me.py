@@ -12,13 +12,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from demo.body_motion import Motion, motion
 from demo.choice import Choice, choices
 from demo.fall import Fall
 from demo.following import TOLERANCE_RAD, WANTED_FRACTION, WINDOW_S, Reference, score_following
-from demo.listening import Heard, listening
+from demo.listening import StreamRecord, listening
 from demo.robot import Robot, TooLate, View
 from demo.stage import PLAN_S, Stage, only_stream
-from demo.standing import Motion, motion
 from demo.table import StageResult
 
 FOLLOW_S = 60.0
@@ -40,7 +40,7 @@ class FollowMe:
     """One robot that is asked to follow. Its methods are stages, in the order they are called."""
 
     robot: Robot
-    body: Heard
+    body: StreamRecord
     reference: Reference
     words: str
     start_rad: float = 0.0
@@ -58,7 +58,7 @@ class FollowMe:
 
         `is_given`: the goal was given before and waits for what the drives bring.
         """
-        self.start_rad = self._standing()
+        self.start_rad = self._still_heading()
         stage = self._stage(name, published_s)
         for drive in drives.values():
             self.robot.plug(drive)
@@ -68,7 +68,7 @@ class FollowMe:
 
     def ask(self, *, name: str) -> StageResult:
         """Ask to be followed, with what there is, and measure whether the robot does."""
-        self.start_rad = self._standing()
+        self.start_rad = self._still_heading()
         stage = self._stage(name)
         share = self._asked(stage)
         return stage.result(reached=share >= WANTED_FRACTION, measure=_told(share))
@@ -101,18 +101,18 @@ class FollowMe:
         goal = self.robot.until(f"{name}: the goal suspended", _suspended, timeout_s=PLAN_S)
         stage.phase("told")
         begin_s = stage.begun_s + brake_s
-        self._until_heard(begin_s + STAND_S)
+        self._until_odometry(begin_s + STAND_S)
         fall = Fall.of(stage.journal())
         stage.phase("halted", fall.decided_s)
         others = {step["component"] for step in steps} - {*lost}
         first = next((n for n, step in enumerate(steps) if step["component"] in lost), 0)
         stage.faults += fall.faults(stage.plan[first:], sorted(others))
         moved = motion(self.body.headings, self.body.places, begin_s, begin_s + STAND_S)
-        if moved is None or not moved.is_standing:
+        if moved is None or not moved.is_still:
             stage.faults.append("the body does not stand")
         said = [s for s in stage.told() if goal["reason"] in s and any(id in s for id in lost)]
         if not said:
-            stage.faults.append(f"nobody was told that {', '.join(sorted(lost))} is missing")
+            stage.faults.append(f"no sentence says that {', '.join(sorted(lost))} is missing")
         measure = (
             f"{len(stage.plan[first:])} behaviours down in one tick, "
             f"{_ms(stage.phases_s['halted'])} after {since}, and all {len(stage.plan)} ended "
@@ -122,8 +122,8 @@ class FollowMe:
         return stage.result(reached=bool(fall.ticks), measure=measure)
 
     def offer(self, drives: Mapping[str, Path], *, name: str) -> StageResult:
-        """Plug in another way to do one of the steps. The plan that runs is left alone; asked
-        anew, the robot takes what is better, and says why."""
+        """Plug in another way to do one of the steps. The running plan goes on; asked again, the
+        robot takes the better way, and says why."""
         stage, goal = self._stage(name), self.robot.view["plan"]["id"]
         for drive in drives.values():
             self.robot.plug(drive)
@@ -134,19 +134,19 @@ class FollowMe:
             lambda view: next((c for c in choices(view["tree"]) if new & {*c.others}), None),
             timeout_s=PLAN_S,
         )
-        self._until_heard(time.monotonic() + LEFT_ALONE_S)
+        self._until_odometry(time.monotonic() + LEFT_ALONE_S)
         if Fall.of(stage.journal()).endings:
-            stage.faults.append("a plan that worked was thrown over")
+            stage.faults.append("a plan that worked was preempted")
         self.robot.ask("halt", id=goal)
         self.robot.until("halted", lambda view: not view["plan"]["steps"], timeout_s=PLAN_S)
-        self.start_rad = self._standing()
+        self.start_rad = self._still_heading()
         share = self._asked(stage)
         taken = self._choice()
         if taken.component not in new or offered.component not in taken.others:
             stage.faults.append(f"{offered.component} was to be replaced by {', '.join(new)}")
         if not offered.cost > taken.cost < taken.others_cost:
             stage.faults.append("what was taken is no better")
-        measure = f"at first {offered}; asked anew {taken}; {_told(share)}"
+        measure = f"at first {offered}; asked again {taken}; {_told(share)}"
         return stage.result(reached=share >= WANTED_FRACTION, measure=measure)
 
     def kill(self, *, name: str) -> StageResult:
@@ -170,7 +170,7 @@ class FollowMe:
         others = {*pids} - {chosen.component}
         stage.faults += [f"{id} got another worker" for id in others if now.get(id) != pids[id]]
         if not any(chosen.component in s and "not ready" in s for s in stage.told()):
-            stage.faults.append(f"nobody was told that {chosen.component} is not ready")
+            stage.faults.append(f"no sentence says that {chosen.component} is not ready")
         # Not `_choice`: the plan has no alternative while the killed worker is being restarted.
         running = {step["component"] for step in self.robot.view["plan"]["steps"]}
         taken = sorted(running & set(chosen.others))
@@ -219,12 +219,12 @@ class FollowMe:
             raise TooLate(f"expected one step with alternatives, found {found}")
         return found[0]
 
-    def _standing(self) -> float:
+    def _still_heading(self) -> float:
         """The heading, once the body has stood for `SETTLED_S`. Raises `TooLate`."""
         deadline = time.monotonic() + PLAN_S
         while time.monotonic() < deadline:
             moved = self._lately(SETTLED_S)
-            if moved is not None and moved.is_standing:
+            if moved is not None and moved.is_still:
                 return self.body.headings[-1][1]
             _pause()
         raise TooLate("the body does not stand still, or tells no heading")
@@ -245,7 +245,7 @@ class FollowMe:
         end_s = headings[-1][0] if headings else 0.0
         return motion(headings, places, end_s - seconds, end_s)
 
-    def _until_heard(self, stamp_s: float) -> None:
+    def _until_odometry(self, stamp_s: float) -> None:
         """Wait until odometry has told of a time. Raises `TooLate`."""
         deadline = time.monotonic() + PLAN_S
         while not self.body.headings or self.body.headings[-1][0] < stamp_s:

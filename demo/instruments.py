@@ -54,7 +54,7 @@ class Instruments:
             truths = read_log(self.log)
             if truths and truths[-1].laser is on:
                 return truths[-1].at_s
-            time.sleep(0.02)  # a plain file tells nobody that it has grown
+            time.sleep(0.02)  # a plain file does not notify its readers when it grows
         raise TimeoutError(f"the laser is not switched {'on' if on else 'off'}")
 
     def score(self, end_s: float) -> Score:
@@ -68,7 +68,7 @@ class Instruments:
             truths = read_log(self.log)
             if (truths and truths[-1].at_s >= until_s) or time.monotonic() > deadline:
                 return truths
-            time.sleep(0.02)  # a plain file tells nobody that it has grown
+            time.sleep(0.02)  # a plain file does not notify its readers when it grows
 
 
 @contextmanager

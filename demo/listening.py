@@ -1,4 +1,4 @@
-"""Listening in on streams of the host while a stage runs: what the scorer is given of it."""
+"""Records streams of the host while a stage runs, for the scorer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nondum.sdk.messages import Image, Message, Pose
 
 
 @dataclass
-class Heard:
+class StreamRecord:
     """How the body moved, and numbers of the frames shown, each with its stamp (monotonic)."""
 
     headings: list[tuple[float, float]] = field(default_factory=list)
@@ -37,9 +37,9 @@ class Heard:
 
 
 @contextmanager
-def listening(control: Path, *streams: str) -> Iterator[Heard]:
+def listening(control: Path, *streams: str) -> Iterator[StreamRecord]:
     """Hear streams from now until the context ends."""
-    heard, stop = Heard(), threading.Event()
+    heard, stop = StreamRecord(), threading.Event()
     threads = [
         threading.Thread(
             target=lambda stream=stream: asyncio.run(_listen(control, stream, heard, stop)),
@@ -55,7 +55,7 @@ def listening(control: Path, *streams: str) -> Iterator[Heard]:
         stop.set()
 
 
-async def _listen(control: Path, stream: str, heard: Heard, stop: threading.Event) -> None:
+async def _listen(control: Path, stream: str, heard: StreamRecord, stop: threading.Event) -> None:
     try:
         with ControlClient(control) as client:
             async for message in messages(client, stream):

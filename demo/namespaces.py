@@ -85,7 +85,7 @@ class Machine:
 
 @dataclass
 class Switch:
-    """One network: whoever is plugged in there hears the others."""
+    """One network: the machines that are plugged in there reach each other."""
 
     number: int
     namespace: str

@@ -35,8 +35,8 @@ STAGES = (BEGIN, "pulled", "put back", "offered", "killed", "II", LAST)
 PHASES = ("seen", "verified", "installed", "ready", "in plan", "goal")
 NOTE = (
     "Seconds after the first drive of the stage went in, until the phase was complete for all of "
-    "its payloads. The published times are for a person with real instruments: they include hands "
-    "that fetch, plug and mount; ours do not, and drives here are folders on a disk."
+    "its payloads. The published times are for a person with real instruments: they include "
+    "the time to fetch, plug in and mount; ours do not, and drives here are folders on a disk."
 )
 
 FOLLOW = "follow me through the facility"
@@ -99,7 +99,7 @@ def _followed(
         yield following.lose(camera, name="pulled")
         say("put back: the camera goes in again; the goal stands")
         yield following.begin(kit.of([CAMERA]), name="put back", is_given=True)
-        say(f"offered: {', '.join(OFFERED)} goes in; later the same is asked for anew")
+        say(f"offered: {', '.join(OFFERED)} goes in; later the same goal is given again")
         yield following.offer(kit.of(OFFERED), name="offered")
         say("killed: the worker of the detector that was chosen gets SIGKILL")
         yield following.kill(name="killed")

@@ -6,8 +6,8 @@ import socket
 
 
 def free_port() -> int:
-    """A port that is given to nobody else, as long as this process lives, but who asks for it by
-    its number, as daemons do (with SO_REUSEADDR, as here)."""
+    """A port that the kernel gives to no other program while this process lives, except to one that
+    binds it by its number with SO_REUSEADDR, as daemons do."""
     reserved = socket.socket()
     reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     reserved.bind(("127.0.0.1", 0))

@@ -134,7 +134,7 @@ class Robot:
             self._changed.notify_all()
 
     def watch(self) -> None:
-        """Keep `view` fresh until the host leaves; runs in a thread of its own."""
+        """Keep `view` fresh until the host leaves; runs in its own thread."""
         try:
             for view in self.shown():
                 self.see(view)
@@ -205,8 +205,8 @@ def running(
 
 
 def configuration(robot: Robot, trust: Path | None = None) -> str:
-    """What a robot is told of itself: slots instead of real ports, and whom to trust; nobody in
-    particular, without a trust file."""
+    """The configuration of a robot: slots instead of real ports, and the trust file; without one,
+    unsigned payloads are allowed."""
     believes = "allow_unsigned = true" if trust is None else f'[trust]\nfile = "{trust}"'
     return f"""\
 [host]

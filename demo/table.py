@@ -19,13 +19,14 @@ class StageResult:
     phases_s: Mapping[str, float]
     """Phase → seconds after the first drive went in."""
     published_s: float | None
-    """Time of the published system for the same stage, with hands; None: it has no such stage."""
+    """Time of the published system for the same stage, a person's work included; None: it has no
+    such stage."""
     reached: bool
     measure: str
     """What was measured, and the bound that it was held to."""
     plan: Sequence[str] = ()
     told: Sequence[str] = field(default_factory=tuple)
-    """What the host said of its own accord during the stage."""
+    """What the host announced during the stage without being asked."""
 
 
 def as_text(results: Sequence[StageResult], *, phases: Sequence[str], note: str) -> str:

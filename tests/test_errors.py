@@ -110,7 +110,7 @@ def test_signals_stay_within_their_package(signal: str) -> None:
         assert signal not in names or path.startswith(f"{SIGNALS[signal]}/"), path
 
 
-def test_nobody_raises_a_bare_exception() -> None:
+def test_no_module_raises_a_bare_exception() -> None:
     for path, tree in sources().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):

@@ -1,4 +1,4 @@
-"""The house keeps its shape: rooms, arrows between them, and the shared namespace."""
+"""The layout of the repository: packages, imports between them, and the shared namespace."""
 
 from __future__ import annotations
 

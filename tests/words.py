@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tokenize
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -85,18 +85,10 @@ def names_of(path: Path) -> Iterator[tuple[int, str]]:
             yield token.start[0], token.string
 
 
-def keys_of(table: Mapping[str, object]) -> Iterator[tuple[int, str]]:
-    """The keys of a table and of those in it."""
-    for key, value in table.items():
-        yield 0, key
-        if isinstance(value, dict):
-            yield from keys_of(value)
-
-
 def main(paths: Iterable[str]) -> int:
     """List the places below `paths`, all of them without any."""
     rules, wanted = read(), tuple(paths)
-    found = []
+    found: list[str] = []
     for name in files():
         if not wanted or name.startswith(wanted):
             path = ROOT / name

@@ -16,6 +16,7 @@ from benchmarks.measuring import Spread, machine, ratio, table, write
 
 from nondum.planning.execute.replay import replayed
 from nondum.planning.execute.running import RunningAction
+from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.planning.execute.world import WorldModel
@@ -70,7 +71,7 @@ class Round:
     peer_ms: float
 
 
-class Nobody:
+class NoRunner:
     """A runner for trees that are built and never ticked."""
 
     def start(self, step: Step) -> RunningAction:
@@ -93,7 +94,7 @@ def main() -> None:
 
 
 def one_round(batch: int) -> Round:
-    """Fifty strangers nobody has met, and a fifty-first."""
+    """Fifty plugins that no parser has read yet, and a fifty-first."""
     present = [stranger(number, batch) for number in range(PRESENT)]
     gc.collect()
     first, more = Watch(), Watch()
@@ -134,7 +135,7 @@ def composed(
             task,
             plan,
             lasting=merged.lasting(),
-            runner=Nobody(),
+            leaves=RunningLeaves(NoRunner(), time.monotonic),
             kind=goal.kind,
             sight=lambda: (WorldModel(), 0.0),
         ),
@@ -188,7 +189,7 @@ reached with. No text was seen before it is measured. The plan ({rounds[0].steps
 {table(header, rows)}
 
 One more costs {ratio(more, first)} of all {PRESENT}: what was parsed, checked and prepared is
-kept; merging and grounding are done anew, and the plan that runs is tried out in the new task.
+kept; merging and grounding are done again, and the plan that runs is tried out in the new task.
 
 For comparison, Fast Downward's translator (Python, too) reads and grounds the merged domain and
 problem in {theirs:.0f} ms; nondum's parse, check and ground take {ratio(front, theirs)} of that.

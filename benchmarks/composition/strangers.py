@@ -78,14 +78,14 @@ _DRIVE = """
 _SURVEY = """
 ; {name}: a map of places, and what was seen in them.
 (define (domain {name})
-  (:types {name}-room - place)
-  (:constants {rooms} - {name}-room)
-  (:functions (way-{name} ?a ?b - {name}-room))
-  (:predicates (next-{name} ?a ?b - {name}-room) (seen-{name} ?r - {name}-room)
+  (:types {name}-zone - place)
+  (:constants {zones} - {name}-zone)
+  (:functions (way-{name} ?a ?b - {name}-zone))
+  (:predicates (next-{name} ?a ?b - {name}-zone) (seen-{name} ?r - {name}-zone)
                (surveyed-{name} ?h - host))
-  (:derived (surveyed-{name} ?h - host) (forall (?r - {name}-room) (seen-{name} ?r)))
+  (:derived (surveyed-{name} ?h - host) (forall (?r - {name}-zone) (seen-{name} ?r)))
   (:action look
-    :parameters (?u - sensor ?a ?b - {name}-room ?h - host)
+    :parameters (?u - sensor ?a ?b - {name}-zone ?h - host)
     :precondition (and (ready ?u) (on ?u ?h) (next-{name} ?a ?b) (seen-{name} ?a))
     :effect (and (seen-{name} ?b) (increase (total-cost) (way-{name} ?a ?b)))))
 """
@@ -160,7 +160,7 @@ _DETECTION = "(detect ?u - detector ?i - image ?o - detections ?h - host ?c - cl
 _STREAMING = Behaviour("stream", "(stream ?u - camera ?o - image ?h - host)", lasting=True)
 _TRACKING = "(track ?u - tracker ?d - detections ?o - twist ?h - host ?c - class)"
 _DRIVING = "(drive ?u - base ?s - twist ?h - host ?c - class)"
-ROOMS = 6
+ZONES = 6
 
 
 def _camera(number: int) -> PluginDescription:
@@ -222,8 +222,8 @@ def _base(number: int) -> PluginDescription:
 
 def _surveyor(number: int) -> PluginDescription:
     name = f"surveyor{number}"
-    rooms = [f"{name}-r{room}" for room in range(ROOMS)]
-    pairs = list(pairwise(rooms))
+    zones = [f"{name}-r{zone}" for zone in range(ZONES)]
+    pairs = list(pairwise(zones))
     ways = " ".join(
         f"(next-{name} {a} {b}) (= (way-{name} {a} {b}) {1 + at})"
         for at, (a, b) in enumerate(pairs)
@@ -231,9 +231,9 @@ def _surveyor(number: int) -> PluginDescription:
     return PluginDescription(
         name,
         "0.9",
-        behaviours=(Behaviour("look", f"(look ?u - sensor ?a ?b - {name}-room ?h - host)"),),
+        behaviours=(Behaviour("look", f"(look ?u - sensor ?a ?b - {name}-zone ?h - host)"),),
         fragments=(
-            Fragment("domain.pddl", _SURVEY.format(name=name, rooms=" ".join(rooms))),
+            Fragment("domain.pddl", _SURVEY.format(name=name, zones=" ".join(zones))),
             Fragment("problem.pddl", _SURVEY_INIT.format(name=name, ways=ways)),
         ),
         units=(Unit("lidar", "sensor"),),

@@ -12,7 +12,7 @@ from nondum.sdk.planner import AlreadyTrue, Plan
 
 
 class Planner:
-    """Plans in one scene, and remembers: equal situations get equal plans, whoever asks."""
+    """Plans in one scene, and remembers: every executor gets equal plans in equal situations."""
 
     def __init__(self, scene: Scene) -> None:
         self._task = scene.task

@@ -122,7 +122,7 @@ class SimulatedRobot:
         self.now_s += 1.0
         self._come_back()
         if self._happens(self.troubles.changes):
-            self._let_others_act()
+            self._let_other_agents_act()
         if self._happens(self.troubles.losses):
             self._lose_a_unit()
         for running in self._running:
@@ -151,7 +151,7 @@ class SimulatedRobot:
         self._base |= step.add
         self.changed()
 
-    def _let_others_act(self) -> None:
+    def _let_other_agents_act(self) -> None:
         possible = [s for s in self._others_actions if s.precondition <= self._base]
         if possible:
             self._apply(self.random.choice(possible))

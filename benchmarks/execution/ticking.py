@@ -13,6 +13,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
 from nondum.planning.execute.running import RunState
+from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
@@ -100,7 +101,7 @@ def nondum(length: int, *news: frozenset[str]) -> Tick:
         task,
         plan,
         lasting=frozenset(),
-        runner=world,
+        leaves=RunningLeaves(world, time.monotonic),
         kind="achieve",
         sight=lambda: (world, 0.0),
     )

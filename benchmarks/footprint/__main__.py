@@ -44,7 +44,7 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
         apart=_apart(folder),
         machine=f"{platform.machine()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.0f}",
         is_emulated=False,
-        start_s=min(wall_s for wall_s, _ in starts),
+        start_s=min(elapsed_s for elapsed_s, _ in starts),
         start_cpu_s=min(cpu_s for _, cpu_s in starts),
         yardstick_s=probe.yardstick(),
         idle=idle,
@@ -53,7 +53,7 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
 
 
 def _apart(folder: Path) -> dict[str, list[int]]:
-    """Memory of a host whose links to peers are a process's of their own."""
+    """Memory of a host that keeps its links to peers in a separate process."""
     (folder / "slots/stick").rename(folder / "stick")
     with running(folder, apart=True) as (pid, _):
         time.sleep(SETTLED_S)

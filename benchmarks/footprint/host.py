@@ -32,8 +32,8 @@ process = {process}
 @contextmanager
 def running(folder: Path, *, apart: bool = False) -> Iterator[tuple[int, float]]:
     """A host that has said that it is ready (sd_notify(3)): its process, and how many seconds that
-    took. `folder` has a short path (unix(7)), and keeps its state from one to the next; `apart` has
-    the links to peers be a process's of their own."""
+    took. `folder` has a short path (unix(7)), and keeps its state from one to the next; `apart`
+    puts the links to peers into a separate process."""
     ready = folder / "ready"
     ready.unlink(missing_ok=True)
     configuration = CONFIGURATION.format(folder=folder, process=str(apart).lower())

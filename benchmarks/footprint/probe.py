@@ -1,6 +1,6 @@
 """What a host takes of its machine, seen from outside: `python3 probe.py PID SECONDS` prints JSON.
 
-A program of its own, of nothing but the standard library, so that it can be put into any machine.
+A separate program that uses only the standard library, so that it runs on any machine.
 It must be root, or the user that the host runs as.
 """
 
@@ -22,7 +22,7 @@ KINDS = {
     "nondum.host.peers.links": "links",
     "bootstrap.py": "worker",
 }
-"""What is in the command of each kind of process, keepers apart, whose program tells them."""
+"""Parts of command lines, and the kind of process that has each; `_kind` knows bubblewrap, too."""
 YARDSTICK = "import asyncio, email.message, http.client, json, logging, sqlite3, ssl, zipfile"
 """What a start is measured against, in the same machine: an interpreter that imports this much of
 the standard library."""
@@ -150,7 +150,7 @@ def _written(pid: int) -> int:
 
 
 def _disk() -> tuple[int, int]:
-    """Writes, and sectors of them, of the machine's first disk, whoever wrote."""
+    """Writes to the machine's first disk by all processes: their number, and their sectors."""
     for line in (PROC / "diskstats").read_text(encoding="ascii").splitlines():
         words = line.split()
         if words[2] in ("vda", "mmcblk0", "nvme0n1", "sda"):

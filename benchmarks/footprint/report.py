@@ -13,11 +13,11 @@ Shown = Callable[[Footprint], str]
 ROWS: Sequence[tuple[str, str, Shown]] = (
     ("memory of the idle daemon", "≤ 60 MB", lambda f: f"{f.daemon_mb:.1f} MB"),
     ("a worker, its plugin importing nothing", "≤ 20 MB", lambda f: f"{f.worker_mb:.1f} MB"),
-    ("a worker's keeper", "", lambda f: f"{f.mb_of('keeper'):.1f} MB"),
+    ("a worker's init (process 1 of its sandbox)", "", lambda f: f"{f.mb_of('keeper'):.1f} MB"),
     ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),
     ("planners, all of them", "", lambda f: f"{f.mb_of('planner'):.1f} MB"),
     ("a child for drives, waiting", "", lambda f: f"{f.mb_of('drive child'):.1f} MB"),
-    ("the links to peers, in a process of their own", "", lambda f: _mb(f.apart_mb("links"))),
+    ("the links to peers, in a separate process", "", lambda f: _mb(f.apart_mb("links"))),
     ("… and the idle daemon then", "≤ 60 MB", lambda f: _mb(f.apart_mb("daemon"))),
     ("processor at idle, the daemon", "≤ 1 %", lambda f: f"{f.idle['cpu_percent']:.2f} %"),
     ("processor at idle, all", "", lambda f: f"{f.idle['cpu_percent_all']:.2f} %"),

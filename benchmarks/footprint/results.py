@@ -20,7 +20,7 @@ class Footprint:
     start_s: float
     """From the start of its process to what it tells systemd: ready. Others delay it."""
     start_cpu_s: float
-    """What its process took of a processor until then, whoever else worked."""
+    """Processor time of its process until then; what other processes use does not count."""
     yardstick_s: float
     """What the yardstick of `probe.py` takes of one there."""
     idle: dict[str, Any]
@@ -28,7 +28,7 @@ class Footprint:
     with_worker: dict[str, list[int]]
     """`probe.memory` with the worker, in kB."""
     apart: dict[str, list[int]] = field(default_factory=dict)
-    """That of the host alone, with a process for its links to peers; empty where nobody looked."""
+    """That of the host alone, with a process for its links to peers; empty where not measured."""
 
     @property
     def daemon_mb(self) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks.measuring import Spread, machine, table
-from benchmarks.misbehaviour.rounds import Decisions, Round, misbehave
+from benchmarks.misbehaviour.measurement import Decisions, Round, misbehave
 from benchmarks.misbehaviour.scene import LIMITS, Scene, scene
 from benchmarks.misbehaviour.ways import WAYS, Way
 from benchmarks.misbehaviour.windows import Window, p99, window

@@ -1,5 +1,5 @@
-"""The command: `python -m benchmarks.peers`, from the root of the checkout; as root where hosts are
-to have machines (network namespaces) of their own."""
+"""The command: `python -m benchmarks.peers`, from the root of the checkout; as root where each host
+is to have a separate machine (network namespace)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The hosts of one measurement: processes of their own, which trust each other."""
+"""The hosts of one measurement: separate processes, which trust each other."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Host:
 
 @contextlib.contextmanager
 def crew(ground: Ground, count: int) -> Iterator[tuple[Host, ...]]:
-    """So many hosts that are ready to start, and know nothing of each other but their keys."""
+    """Start `count` processes of hosts, each of which knows the keys of the others only."""
     keys = {name: HostKeys.generate() for name in NAMES[:count]}
     trusted = {one.public: name for name, one in keys.items()}
     with contextlib.ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""Where the hosts that are measured run: on machines of their own, or all on this one."""
+"""Where the hosts that are measured run: each on a separate machine, or all on this one."""
 
 from __future__ import annotations
 
@@ -47,5 +47,5 @@ def ground() -> Iterator[Ground]:
         except NamespacesUnavailable:
             yield LOOPBACK
         else:
-            told = "each on a machine of its own (network namespaces on one switch)"
+            told = "each on a separate machine (network namespaces on one switch)"
             yield Ground(told, "tcp://*:7410", machines)

@@ -36,12 +36,12 @@ HANGING_S = 30.0
 class Silent:
     """Serves nothing."""
 
-    def serve(self, errand: IncomingCall) -> dict[str, Any]:
+    def serve(self, incoming: IncomingCall) -> dict[str, Any]:
         return {}
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 

@@ -56,7 +56,7 @@ def at_once(ground: Ground) -> Sample:
 
 
 def third(ground: Ground) -> Sample:
-    """A host that starts anew beside two that are linked."""
+    """A third host that starts beside two that are linked."""
     with crew(ground, 3) as (*linked, new):
         link(*linked)
         new.order("start")

@@ -142,7 +142,7 @@ def _calls(found: calls.Found, calls_each: int) -> Iterator[str]:
         "not encrypted either. Zenoh: two peers, a querier and a queryable, "
         "shared memory off, set as it was quickest. From asyncio, replies hop from Zenoh's thread "
         "to the loop, as in any program with a loop; from threads, the caller waits for its reply, "
-        "and no program with a loop may. Zenoh answers on a thread of its own, all others on a "
+        "and no program with a loop may. Zenoh answers on a separate thread, all others on a "
         "loop.",
         "p99 mostly shows what else the machine was doing; compare medians and ratios.",
     )

@@ -41,15 +41,15 @@ Keys = Mapping[str, str]
 class Answering:
     """Serves one thing; at once, or as a task that can be cancelled."""
 
-    def serve(self, errand: IncomingCall) -> dict[str, str] | Awaitable[dict[str, str]]:
-        return REPLY if errand.method == "now" else self.later()
+    def serve(self, incoming: IncomingCall) -> dict[str, str] | Awaitable[dict[str, str]]:
+        return REPLY if incoming.method == "now" else self.later()
 
     async def later(self) -> dict[str, str]:
         return REPLY
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 
@@ -104,7 +104,7 @@ async def by_zenoh(keys: Keys) -> None:
 
 
 def zenoh_session(settings: Mapping[str, object]) -> Any:
-    """A session of two peers that need nobody else, over TCP."""
+    """A session of two peers over TCP, without a router and without discovery."""
     zenoh: Any = importlib.import_module("zenoh")
     config = zenoh.Config()
     alone = {

@@ -1,4 +1,4 @@
-"""Who is measured: each in a process of its own, `python -m benchmarks.planning.contenders NAME …`.
+"""The planners that are measured, in one process each: `python -m …planning.contenders NAME …`.
 
 It prints one line of JSON: what it answers, and how long each phase took.
 """

@@ -137,4 +137,4 @@ def _wrong(results: Results) -> str:
         }.items():
             if problems:
                 lines.append(f"{contender} {what}: {', '.join(problems)}.")
-    return _list(lines) or "Nobody, and nothing."
+    return _list(lines) or "None."

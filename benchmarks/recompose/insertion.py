@@ -99,9 +99,10 @@ def _await(is_done: Callable[[], bool], otherwise: str) -> None:
 
 
 def _is_compiled(robot: Robot) -> bool:
-    """Whether the venvs have compiled modules, which come last; urges whoever makes them.
+    """Whether the venvs have compiled modules, which come last.
 
-    Hosts leave it to idle moments, which a machine that has other work may not have for minutes.
+    Raises the priority of the processes that compile them: hosts leave it to idle moments, which
+    a machine that has other work may not have for minutes.
     """
     for pid in descendants(daemon(robot)):
         with contextlib.suppress(OSError):  # it has just ended, or it may not be done

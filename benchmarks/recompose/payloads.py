@@ -21,7 +21,7 @@ CONTENT = {
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A payload on a drive of its own."""
+    """A payload, and the drive that holds it alone."""
 
     name: str
     drive: Path

@@ -1,4 +1,4 @@
-"""Containers as a fleet would run them: podman, with a storage of its own for the time of a run."""
+"""Containers as a fleet would run them: podman, with a storage folder that lasts for one run."""
 
 from __future__ import annotations
 

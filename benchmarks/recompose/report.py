@@ -22,7 +22,7 @@ def as_markdown(results: Results) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, words: int = 2) -> str:
-    """A Markdown table; the first columns, so many, hold words, the others figures.
+    """A Markdown table; the first `words` columns hold words, the others figures.
 
     >>> print(table(["what", "ms"], [["a", "1"], ["bc", "20"]], words=1))
     | what | ms |

@@ -53,7 +53,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rounds", type=int, default=20, help="stops of each way [20]")
     parser.add_argument("--voices", type=int, default=12, help="voices that say each sentence [12]")
     parser.add_argument(
-        "--sentences", type=int, help="so many of the sentences that stop nothing [all]"
+        "--sentences", type=int, help="how many of the sentences that stop nothing [all]"
     )
     parser.add_argument("--part", action="append", choices=PARTS, help="only this; repeatable")
     parser.add_argument("--out", type=Path, default=PAGE, help="the page to write")

@@ -1,4 +1,4 @@
-"""What is said to the ears: words that stop, and sentences that are none."""
+"""What is said to the speech plugin: words that stop, and other sentences."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ALIKE = (
 OF_ROBOT = (
     "I was asked to follow you, and I do, with recorded-camera, people-detector and mobile-base.",
     "I can follow you and look for you; to point at something I need a target.",
-    "I am doing nothing; nobody has given me a goal.",
+    "I am doing nothing; no one has given me a goal.",
     "I have found people.",
     "speech heard 'follow me': that is goal 3",
     "speech heard 'stop': goal 3 is halted",

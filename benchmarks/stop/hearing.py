@@ -1,4 +1,4 @@
-"""Stops that are said: heard by the speech plugin's ears, sample by sample as from a microphone."""
+"""Spoken stops: the speech plugin's listener gets them sample by sample as from a microphone."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from benchmarks.stop.room import Room
 
 from nondum.planning.words.addressee import addressed_to
 from nondum.planning.words.stop_words import STOPS, host_behind_stop, is_stop
-from nondum_speech.ears import Ears
 from nondum_speech.espeak import Espeak
+from nondum_speech.listener import SpeechListener
 from nondum_speech.settings import Settings
 from nondum_speech.sound import RATE_HZ, Sound
 
@@ -34,7 +34,7 @@ OWN_DB = (10, 0, -10)
 OWN_LEVEL, HISS_LEVEL = 400.0, 4.0
 """Root mean square of the robot's voice at its microphone, and of a room's hiss."""
 BEFORE = 3
-"""So many sentences the robot has said before anything is measured."""
+"""How many sentences the robot has said before anything is measured."""
 INTERRUPTS_S = (0.5, 2.0)
 """A person begins so long after the robot's voice is heard, or before it ends."""
 LEAD_S, TAIL_S = 1.0, 2.0
@@ -43,7 +43,7 @@ PIECE = RATE_HZ // 50
 WORDS_PER_MINUTE = 160
 SILENT_PART = 0.02
 """Below such a part of the loudest sample a voice has ended."""
-ALONE = "the robot speaks, and nobody else"
+ALONE = "only the robot speaks"
 
 Says = Callable[[str], None]
 Waves = npt.NDArray[Any]
@@ -63,19 +63,19 @@ class Scene:
 
 
 class Listener:
-    """The plugin's ears, and what is said to them."""
+    """The plugin's listener, and what is said to it."""
 
     def __init__(self, espeak: Espeak) -> None:
         self._espeak = espeak
         log = logging.getLogger("benchmarks.stop")
-        self._ears = Ears(espeak, log, Settings().limits, listens_on=True)
+        self._listener = SpeechListener(espeak, log, Settings().limits, listens_on=True)
         self._room = Room(7)
         self._chance = np.random.default_rng(7)
         self._own = itertools.cycle(OF_ROBOT)
 
     async def learn(self) -> None:
         """Know what a host with the shipped plugins tells, and how the own voice is heard."""
-        await self._ears.learn(KNOWN)
+        await self._listener.learn(KNOWN)
         for _ in range(BEFORE):
             await self.alone(next(self._own))
 
@@ -83,7 +83,7 @@ class Listener:
         """A person's words."""
         return self._espeak.say(text, voice=voice, words_per_minute=WORDS_PER_MINUTE)
 
-    async def heard(self, text: str, voice: str, *, noise_db: int | None = None) -> Spoken:
+    async def spoken(self, text: str, voice: str, *, noise_db: int | None = None) -> Spoken:
         """Say something, perhaps under noise."""
         said = self.said(text, voice)
         samples = _among_silence(said)
@@ -93,8 +93,8 @@ class Listener:
         begin = int(LEAD_S * RATE_HZ)
         return await self._attended(Scene(samples, begin, begin + _end(said)), text, voice)
 
-    async def heard_over(self, text: str, voice: str, *, own_db: int) -> Spoken:
-        """Say something while the robot speaks, whose voice is so much weaker."""
+    async def spoken_over(self, text: str, voice: str, *, own_db: int) -> Spoken:
+        """Say something while the robot speaks, whose voice is `own_db` weaker."""
         said = self.said(text, voice)
         own, heard, start = self._spoken_by_robot(next(self._own))
         words = self._room.person(said.samples.astype(np.float64))
@@ -108,7 +108,7 @@ class Listener:
         return await self._attended(scene, text, voice)
 
     async def alone(self, text: str) -> Spoken:
-        """Have the robot say something, to nobody."""
+        """Have the robot say something while no person speaks."""
         own, heard, start = self._spoken_by_robot(text)
         scene = Scene(np.pad(heard, (0, RATE_HZ)), 0, len(heard), own, start + len(own.samples))
         return await self._attended(scene, text, Settings().voice)
@@ -124,13 +124,13 @@ class Listener:
 
     async def _attended(self, scene: Scene, text: str, voice: str) -> Spoken:
         found: list[tuple[str, float, float]] = []
-        queue = self._ears.sentences
+        queue = self._listener.sentences
         samples = np.clip(scene.samples, -32768, 32767).astype("<i2")
 
         async def pieces() -> AsyncIterator[bytes]:
             with contextlib.ExitStack() as saying:
                 if scene.own is not None:
-                    saying.enter_context(self._ears.saying(scene.own))
+                    saying.enter_context(self._listener.saying(scene.own))
                 for start in range(0, len(samples), PIECE):
                     if start >= scene.own_end:
                         saying.close()
@@ -144,7 +144,7 @@ class Listener:
                         if until > scene.begin:
                             found.append((words, late_s + took_s, late_s))
 
-        await self._ears.attend(pieces())
+        await self._listener.attend(pieces())
         stops = [one for one in found if _is_stop(one[0])]
         if not found:
             return Spoken(text, voice, None, is_stop=False)
@@ -159,32 +159,34 @@ async def measured(
     listener = Listener(espeak)
     await listener.learn()
 
-    async def heard(texts: Sequence[str], noise_db: int | None) -> tuple[Spoken, ...]:
-        return tuple([await listener.heard(t, v, noise_db=noise_db) for t in texts for v in voices])
-
-    async def heard_over(texts: Sequence[str], own_db: int) -> tuple[Spoken, ...]:
+    async def spoken(texts: Sequence[str], noise_db: int | None) -> tuple[Spoken, ...]:
         return tuple(
-            [await listener.heard_over(t, v, own_db=own_db) for t in texts for v in voices]
+            [await listener.spoken(t, v, noise_db=noise_db) for t in texts for v in voices]
+        )
+
+    async def spoken_over(texts: Sequence[str], own_db: int) -> tuple[Spoken, ...]:
+        return tuple(
+            [await listener.spoken_over(t, v, own_db=own_db) for t in texts for v in voices]
         )
 
     found = []
     for noise_db in (None, *NOISES_DB):
         name = "quiet" if noise_db is None else f"white noise, {noise_db} dB below"
         say(f"spoken: {name}")
-        stops = await heard(STOPS, noise_db)
-        found.append(Hearing(name, stops, await heard(sentences, noise_db)))
+        stops = await spoken(STOPS, noise_db)
+        found.append(Hearing(name, stops, await spoken(sentences, noise_db)))
     for own_db in OWN_DB:
         name = f"while the robot speaks, its voice {_told(own_db)}"
         say(f"spoken: {name}")
-        stops = await heard_over(STOPS, own_db)
-        found.append(Hearing(name, stops, await heard_over(sentences, own_db)))
+        stops = await spoken_over(STOPS, own_db)
+        found.append(Hearing(name, stops, await spoken_over(sentences, own_db)))
     say(f"spoken: {ALONE}")
     found.append(Hearing(ALONE, (), tuple([await listener.alone(text) for text in OF_ROBOT])))
     return found
 
 
 def run(voices: int, sentences: int | None, say: Says) -> list[Hearing]:
-    """Measure with the first so many voices, and so many of the other sentences (None: all)."""
+    """Measure with the first `voices` voices and that many other sentences (None: all)."""
     others = OTHERS if sentences is None else OTHERS[:: max(1, len(OTHERS) // sentences)]
     with tempfile.TemporaryDirectory() as scratch:
         return asyncio.run(measured(Espeak(Path(scratch)), VOICES[:voices], others, say))

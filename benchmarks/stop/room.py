@@ -1,8 +1,8 @@
 """A robot in a room, simulated: how its own voice, and a person's, come to its microphone.
 
 The loudspeaker is small: it has no bass, is uneven, and is driven a little too far. The way from it
-to the microphone is the same as long as the robot is; what the walls give back is another each
-time, for robots move. A player starts when it likes.
+to the microphone is the same as long as the robot is; what the walls reflect differs each time,
+for robots move. The delay until a player starts varies.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nondum_speech.sound import RATE_HZ
 REVERBERATION_S = 0.4
 """Until it has fallen by 60 dB."""
 OF_OWN, OF_PERSON = 0.35, 0.3
-"""What comes back from the walls, next to what comes straight, in amplitude."""
+"""Amplitude of the sound that the walls reflect, next to that of the direct sound."""
 _START_S = (0.1, 0.5)
 _LOWEST_HZ = 250.0
 _UNEVEN = 0.15
@@ -30,7 +30,7 @@ Waves = npt.NDArray[Any]
 
 
 class Room:
-    """One robot's loudspeaker and microphone, and walls that change each time."""
+    """One robot's loudspeaker and microphone, and an impulse response that differs each time."""
 
     def __init__(self, seed: int) -> None:
         self._chance = np.random.default_rng(seed)
@@ -44,16 +44,16 @@ class Room:
         """The robot's own voice at its microphone, as loud as it was."""
         peak = float(np.abs(samples).max(initial=0)) + 1
         driven = np.tanh(samples / peak) * peak
-        way = np.fft.irfft(np.fft.rfft(self._walls(OF_OWN)) * self._response)
+        way = np.fft.irfft(np.fft.rfft(self._impulse_response(OF_OWN)) * self._response)
         heard = np.convolve(driven, np.roll(way, _LAG))
         return heard * (float(np.std(samples)) / max(1.0, float(np.std(heard[: len(samples)]))))
 
     def person(self, samples: Waves) -> Waves:
         """A person's voice, as loud as it was."""
-        heard = np.convolve(samples, self._walls(OF_PERSON))
+        heard = np.convolve(samples, self._impulse_response(OF_PERSON))
         return heard * (float(np.std(samples)) / max(1.0, float(np.std(heard[: len(samples)]))))
 
-    def _walls(self, strength: float) -> Waves:
+    def _impulse_response(self, strength: float) -> Waves:
         length = int(REVERBERATION_S * RATE_HZ)
         fallen = 10 ** (-3 * np.arange(length) / length)
         way = self._chance.normal(0, 1, length) * fallen

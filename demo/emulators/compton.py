@@ -53,10 +53,10 @@ class ComptonCamera:
         if self._now_s >= self._next_status_s:
             self._next_status_s += 1.0
             status = _STATUS.pack(int(self._now_s * 1e3), self._sequence, self._lost)
-            self._fifo += _frame(2, status)  # there is always room for this one
-        room = int(BYTES_PER_S * dt_s)
-        sent = bytes(self._fifo[:room])
-        del self._fifo[:room]
+            self._fifo += _frame(2, status)  # the FIFO keeps space for this one
+        most = int(BYTES_PER_S * dt_s)
+        sent = bytes(self._fifo[:most])
+        del self._fifo[:most]
         return sent
 
     def _push(self, frame: bytes) -> None:
@@ -89,10 +89,10 @@ class ComptonCamera:
 
     def _background(self, dt_s: float) -> Floats:
         """Energies: the line's photons after scattering in the room, and a natural continuum."""
-        room = int(self._rng.poisson(ROOM_SCATTER * self.photons_hz * dt_s))
+        scattered = int(self._rng.poisson(ROOM_SCATTER * self.photons_hz * dt_s))
         natural = int(self._rng.poisson(NATURAL_HZ * dt_s))
         continuum = np.minimum(80 + self._rng.exponential(400, natural), 2614.5)
-        return np.concatenate((self._rng.uniform(80, LINE_KEV, room), continuum))
+        return np.concatenate((self._rng.uniform(80, LINE_KEV, scattered), continuum))
 
 
 def straight_hz(activity_bq: float, distance_mm: float) -> float:

@@ -49,7 +49,7 @@ class Pairs:
 def from_point(
     rng: np.random.Generator, source_mm: Floats, energy_kev: float, photons: int
 ) -> Pairs:
-    """What the block records of so many photons from `source_mm` that would interact in it if
+    """What the block records of `photons` photons from `source_mm` that would interact in it if
     nothing were in their way (see `interacting_area_mm2`)."""
     energies = np.full(photons, energy_kev)
     return _record(rng, *_entering(rng, source_mm, energies), energies)

@@ -9,8 +9,8 @@ import tty
 
 
 class Port:
-    """Raw bytes to and from whoever opens `path`. With nobody reading, bytes are lost, as on a
-    real line without flow control."""
+    """Raw bytes to and from the program that opens `path`. While no program reads, bytes are lost,
+    as on a real line without flow control."""
 
     def __init__(self) -> None:
         # The terminal end stays open here too: drivers may come and go without a hang-up.
@@ -25,7 +25,7 @@ class Port:
         return os.read(self._master, 4096) if ready else b""
 
     def write(self, data: bytes) -> int:
-        """Send; the number of bytes that found room."""
+        """Send; answers how many bytes the kernel took."""
         try:
             return os.write(self._master, data) if data else 0
         except BlockingIOError:
@@ -35,7 +35,7 @@ class Port:
         return self._master
 
     def hang_up(self) -> None:
-        """End the line: whoever has it open sees a hang-up, and nobody opens it again."""
+        """End the line: a program that has it open sees a hang-up, and none can open it again."""
         for end in (self._master, self._terminal):
             if end >= 0:
                 os.close(end)

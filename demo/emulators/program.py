@@ -37,7 +37,7 @@ def arguments(about: str) -> Arguments:
 
 
 def ports(given: Arguments, number: int) -> list[Port | SocketPort]:
-    """The ports of an instrument that has so many."""
+    """The ports of an instrument that has `number` of them."""
     if not given.at:
         return [Port() for _ in range(number)]
     return [SocketPort(path) for _, path in zip(range(number), given.at, strict=True)]

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TextIO
 
-if __name__ == "__main__":  # a program of its own, whatever folder it is started in
+if __name__ == "__main__":  # run as a program, from any folder
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from demo.emulators.pan_tilt import PanTiltUnit

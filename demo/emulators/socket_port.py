@@ -8,12 +8,12 @@ import socket
 from pathlib import Path
 
 LINE_BYTES = 4096
-"""Room for bytes under way: as little as the kernel gives, since a line keeps nothing."""
+"""Size of the send buffer: as small as the kernel allows, since a line keeps nothing."""
 
 
 class SocketPort:
-    """Raw bytes to and from whoever connects, one at a time, the newest; they may come and go. What
-    is sent while nobody is there, or takes it, is lost, as on a real line without flow control."""
+    """Raw bytes to and from one client at a time, the newest; clients may come and go. What is sent
+    while no client is connected, or none reads, is lost, as on a real line without flow control."""
 
     def __init__(self, path: Path) -> None:
         self.path = str(path)
@@ -32,7 +32,7 @@ class SocketPort:
         return self._received(self._peer) if self._peer in ready and self._peer else b""
 
     def write(self, data: bytes) -> int:
-        """Send; the number of bytes that found room."""
+        """Send; answers how many bytes the kernel took."""
         if self._peer is None or not data:
             return 0
         try:

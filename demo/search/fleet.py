@@ -1,4 +1,4 @@
-"""A fleet made for one demonstration: hosts that it certifies let each other in, nobody else."""
+"""A fleet for one demonstration: hosts that it certifies accept each other and no other host."""
 
 from __future__ import annotations
 

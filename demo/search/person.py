@@ -1,6 +1,6 @@
-"""A person's voice and ears, of the same parts as the speech payload's: eSpeak NG and PocketSphinx.
+"""A person who speaks and listens, by the speech payload's parts: eSpeak NG and PocketSphinx.
 
-They are no payload's: sentences leave and enter as WAV files, as if through the air.
+They run in no payload: sentences leave and enter as WAV files, in place of sound.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Person:
         scratch.mkdir()
         self._scratch = scratch
         self._espeak = Espeak(scratch)
-        self._ears = self._made_ears(tuple(expects))
+        self._recogniser = self._made_recogniser(tuple(expects))
 
     def say(self, words: str, into: Path) -> Path:
         """Write a WAV file of what they say; answers the file."""
@@ -47,10 +47,10 @@ class Person:
         from nondum_speech.sentences import sentences_of
         from nondum_speech.sound import read_wav
 
-        heard = (self._ears.hear(sentence).said for sentence in sentences_of(read_wav(wav)))
+        heard = (self._recogniser.hear(sentence).said for sentence in sentences_of(read_wav(wav)))
         return tuple(filter(None, heard))
 
-    def _made_ears(self, expects: tuple[str, ...]) -> Recogniser:
+    def _made_recogniser(self, expects: tuple[str, ...]) -> Recogniser:
         from nondum_speech.grammar import Vocabulary
         from nondum_speech.lexicon import lexicon
         from nondum_speech.recogniser import FreeHearing, Recogniser

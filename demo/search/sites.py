@@ -1,4 +1,4 @@
-"""Where three hosts are: a network of their own, or, without root, this machine's loopback."""
+"""Where three hosts run: in their own network, or, without root, on this machine's loopback."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Site(Protocol):
         """Make a host one of these, before it is started; its lines of configuration."""
         ...
 
-    def inside(self, name: str) -> Sequence[str]:
-        """What runs commands on that host's machine."""
+    def command_prefix(self, name: str) -> Sequence[str]:
+        """The words before a command that runs it on that host's machine."""
         ...
 
     def lose(self, robot: Robot) -> None:
@@ -60,8 +60,8 @@ class Lan:
         self._fleet.admit(name, state)
         return "\n[peers]\nenabled = true\n"
 
-    def inside(self, name: str) -> Sequence[str]:
-        """Its namespace."""
+    def command_prefix(self, name: str) -> Sequence[str]:
+        """They enter its namespace."""
         return self._machines[name].command()
 
     def lose(self, robot: Robot) -> None:
@@ -86,8 +86,8 @@ class Loopback:
             f'listen = ["tcp://127.0.0.1:{self._ports[name]}"]\nstatic = {others}\n'
         )
 
-    def inside(self, name: str) -> Sequence[str]:
-        """Nothing: they run here."""
+    def command_prefix(self, name: str) -> Sequence[str]:
+        """None: its commands run here."""
         return ()
 
     def lose(self, robot: Robot) -> None:

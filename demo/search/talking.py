@@ -1,4 +1,4 @@
-"""A host that people talk to: its ears and voice are WAV files, in folders that its logs name."""
+"""A host that people talk to: it hears and speaks WAV files, in folders that its logs name."""
 
 from __future__ import annotations
 

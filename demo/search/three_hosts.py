@@ -45,9 +45,9 @@ NOTE = (
     "Seconds after the stage's robot (and, in the first, the node) was switched on; for “steered”, "
     "after it was asked for, with the ten seconds over which it is judged; then after the node "
     "vanished. The published times are for a person with real robots and other hardware: they "
-    "include hands that fetch and plug, and a person who walks up to be found; ours do not. Hosts "
-    "here are processes of one machine, drives are folders, and the thermal camera is simulated, "
-    "from a recording of real people."
+    "include the time to fetch and plug in payloads, and to walk up to be found; ours do not. "
+    "Hosts here are processes of one machine, drives are folders, and the thermal camera is "
+    "simulated, from a recording of real people."
 )
 OTHER_SENTENCES = ("i can see a robot", "i cannot see a person", "i have lost the person")
 EXAMPLES = """\
@@ -55,7 +55,7 @@ examples:
   ./run demo search                       as root: in network namespaces, with keys
   ./run demo search --loopback            without: three processes that trust each other
   ./run demo search --json | jq .stages
-  ./run demo search --without speaker     must fail: nobody says the alert
+  ./run demo search --without speaker     must fail: no speaker says the alert
 """
 
 
@@ -137,7 +137,7 @@ def _switched_on(
             initial=kit.of(initial),
             trust=kit.trust,
             more=more,
-            inside=where.inside(name),
+            inside=where.command_prefix(name),
         )
     )
 

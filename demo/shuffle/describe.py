@@ -20,7 +20,7 @@ from nondum.sdk.plugin import describe, load
 
 
 class Absent(MetaPathFinder, Loader):
-    """Finds every module that nobody else has found: it has whatever is asked of it."""
+    """Finds each module that no other finder has found: a mock that has every attribute."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None

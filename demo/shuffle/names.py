@@ -111,7 +111,7 @@ class Names:
 
 
 def chosen(packages: Sequence[Package], descriptions: Iterable[Table], words: Words) -> Names:
-    """Choose a new name for everything that the packages call by a name of their own."""
+    """Choose a new name for everything that the packages name and the core does not."""
     core = Core()
     said = list(descriptions)
     payloads = [package.payload for package in packages if package.payload]

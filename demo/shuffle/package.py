@@ -61,7 +61,7 @@ class Package:
         return dict(points.get(ENTRY_POINT_GROUP, {}))
 
     def described(self, beside: Sequence[Path]) -> list[Table]:
-        """What its plugins say about themselves, asked in a process of their own.
+        """What its plugins say about themselves, asked in separate processes.
 
         `beside` are the folders of packages that it may import.
         """

@@ -131,7 +131,7 @@ def _is_docstring(node: ast.AST) -> bool:
 
 
 def _parts(tree: ast.AST) -> Iterator[tuple[ast.AST, Part | None]]:
-    """The part of literals in places of their own; None: words that stay as people say them."""
+    """The part of literals that stand in known places; None: words that stay as people say them."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name == "labels":
             yield from ((inner, None) for inner in ast.walk(node))

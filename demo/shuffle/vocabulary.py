@@ -14,7 +14,7 @@ _ALWAYS = frozenset({(Part.OBJECT, "self"), (Part.TYPE, "object"), (Part.PREDICA
 
 
 class Core:
-    """The words that nondum-core shares; nobody may call them otherwise."""
+    """The words that nondum-core shares; no package may rename them."""
 
     def __init__(self) -> None:
         text = (

@@ -51,7 +51,7 @@ def test_every_scene_has_a_plan_and_units_that_may_go(scenes: dict[str, Scene], 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
 @pytest.mark.parametrize("name", ["gripper", "follow"])
-def test_calm_worlds_trouble_nobody(scenes: dict[str, Scene], name: str, executor: str) -> None:
+def test_calm_worlds_cause_no_trouble(scenes: dict[str, Scene], name: str, executor: str) -> None:
     place = scenes[name]
     outcome = run(place, Planner(place), EXECUTORS[executor], CALM, seed=1)
     assert outcome.reached
@@ -125,7 +125,7 @@ def test_goal_does_not_hold_where_a_behaviour_lacks_what_it_needs(
     assert robot.goal_holds
     assert camera is not None
     camera.halt()
-    assert "following rover person" in robot.facts  # nobody has noticed yet
+    assert "following rover person" in robot.facts  # no condition has noticed yet
     assert not robot.goal_holds
     for _ in range(3):
         robot.moment()

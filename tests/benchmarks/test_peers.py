@@ -1,4 +1,4 @@
-"""benchmarks/peers sees what it times; its times are nobody's to assert."""
+"""benchmarks/peers sees what it times; no test asserts its times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""benchmarks/planning counts what is right, and nobody is let off the limit."""
+"""benchmarks/planning counts only right answers, and stops every planner at its time limit."""
 
 from __future__ import annotations
 

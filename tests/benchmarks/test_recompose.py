@@ -1,4 +1,4 @@
-"""The arithmetic and the tables of benchmarks/recompose; its times are nobody's to assert."""
+"""The arithmetic and the tables of benchmarks/recompose; no test asserts its times."""
 
 from __future__ import annotations
 

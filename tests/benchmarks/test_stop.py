@@ -1,4 +1,4 @@
-"""The arithmetic, the tables and the key of benchmarks/stop; its times are nobody's to assert."""
+"""The arithmetic, the tables and the key of benchmarks/stop; no test asserts its times."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def said(text: str, heard: str | None, *, stops: bool, after_s: float | None = N
     return Spoken(text, "en", heard, stops, after_s)
 
 
-def test_what_is_heard_is_missed_mistaken_or_false() -> None:
+def test_recognised_words_are_missed_mistaken_or_false() -> None:
     stops = (
         said("stop", "stop", stops=True, after_s=0.7),
         said("halt", "halt", stops=True, after_s=1.2),

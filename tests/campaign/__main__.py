@@ -16,8 +16,8 @@ from pathlib import Path
 from tests.campaign import driver, page
 from tests.campaign.age import Age, ages
 from tests.campaign.driver import AlreadyRunning, Outcome
+from tests.campaign.progress import Limit, minutes_of
 from tests.campaign.registry import CAMPAIGNS
-from tests.campaign.rounds import Limit, minutes_of
 
 ROOT = Path(__file__).parents[2]
 SHORTEST_MINUTES = 5.0
@@ -70,7 +70,7 @@ def main(words: Sequence[str], root: Path = ROOT) -> int:
 def shares(
     minutes: float | None, left: int, elapsed_minutes: float, shortest: float = 0.0
 ) -> float | None:
-    """How many minutes the next of so many campaigns gets; 0: none are left.
+    """How many minutes the next of `left` campaigns gets; 0: none are left.
 
     >>> shares(60, 3, 0.0), shares(60, 2, 10.0), shares(60, 10, 58.0, 5.0), shares(None, 3, 0.0)
     (20.0, 25.0, 2.0, None)

@@ -28,8 +28,8 @@ from typing import TextIO
 from tests.campaign import checkout, page
 from tests.campaign.age import ages
 from tests.campaign.page import Last
+from tests.campaign.progress import Progress
 from tests.campaign.registry import Campaign
-from tests.campaign.rounds import Rounds
 
 FOLDER = Path("build/campaigns")
 ENDS_WITHIN_S = 180.0
@@ -79,7 +79,7 @@ def run(
     is_seed_asked: bool = False,
     say: Callable[[str], None],
 ) -> Outcome:
-    """Go on with a campaign for so many minutes, and write the result into the page.
+    """Go on with a campaign for `minutes`, and write the result into the page.
 
     With None for the minutes it goes on until it is done. A round goes on with the seed that it
     began with, unless a seed is asked for. Raises `AlreadyRunning`.
@@ -105,12 +105,12 @@ def run(
         changed = checkout.contents(root, campaign.covers) != state.contents
         if changed and not commit.endswith(page.DIRTY):
             commit += page.DIRTY
-        rounds = Rounds.read(home / "round")
+        progress = Progress.read(home / "round")
         outcome = Outcome(
             campaign.name,
-            _result(status, rounds, was_interrupted=was_interrupted),
+            _result(status, progress, was_interrupted=was_interrupted),
             *(took, commit, state.seed, str(home / "round")),
-            failed=rounds.failed if rounds else (),
+            failed=progress.failed if progress else (),
             was_interrupted=was_interrupted,
         )
         _keep(root, outcome, state.minutes + took)
@@ -128,18 +128,18 @@ def _goes_on(root: Path, campaign: Campaign, new: State, *, is_seed_asked: bool)
 
 def _is_over(root: Path, campaign: Campaign) -> bool:
     """Whether the round is whole, and was either counted for this commit or has failed."""
-    rounds = Rounds.read(root / FOLDER / campaign.name / "round")
-    if rounds is None or not rounds.is_whole:
+    progress = Progress.read(root / FOLDER / campaign.name / "round")
+    if progress is None or not progress.is_whole:
         return False
     (age,) = (age for age in ages(root) if age.campaign == campaign.name)
-    return bool(rounds.failed) or age.is_current
+    return bool(progress.failed) or age.is_current
 
 
 def _set_aside(home: Path) -> None:
     """Remove the former round; one in which something failed is kept."""
     former = home / "round"
-    rounds = Rounds.read(former)
-    if rounds is not None and rounds.failed:
+    progress = Progress.read(former)
+    if progress is not None and progress.failed:
         moment = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
         former.rename(home / f"failed-{moment}")
     elif former.exists():
@@ -166,7 +166,7 @@ def _command(
         (home / folder).mkdir(exist_ok=True)
     words = campaign.arguments(minutes, seed=seed, folder=home / "round", keep=home / "keep")
     command = [sys.executable, *words]
-    # In a group of its own: Ctrl-C comes from here, once.
+    # In a separate process group: Ctrl-C comes from here, once.
     with (
         (home / "log").open("w", encoding="utf-8") as log,
         subprocess.Popen(
@@ -200,14 +200,14 @@ def _pass_on(lines: Iterable[str], log: TextIO, say: Callable[[str], None]) -> N
         say(line.rstrip("\n"))
 
 
-def _result(status: int, rounds: Rounds | None, *, was_interrupted: bool) -> str:
-    if rounds is not None and rounds.failed:
+def _result(status: int, progress: Progress | None, *, was_interrupted: bool) -> str:
+    if progress is not None and progress.failed:
         return page.FAILED
     if status != 0 and not was_interrupted:
         return page.FAILED
-    if rounds is None:
+    if progress is None:
         return "0 of 1" if was_interrupted else page.PASSED
-    return page.PASSED if rounds.is_whole else str(rounds)
+    return page.PASSED if progress.is_whole else str(progress)
 
 
 def _keep(root: Path, outcome: Outcome, minutes: float) -> None:

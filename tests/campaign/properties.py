@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.campaign import suites
-from tests.campaign.rounds import Limit, Round, work_off
+from tests.campaign.progress import Limit, Round, work_off
 
 SEEDS = 3
 """A test that asks for a number of examples gets as many for each of these."""

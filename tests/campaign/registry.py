@@ -42,7 +42,7 @@ class Campaign:
         return self.module == SUITES
 
     def arguments(self, minutes: float | None, *, seed: int, folder: Path, keep: Path) -> list[str]:
-        """Of Python, to go on for so many minutes; None: until it is done."""
+        """Of Python, to go on for `minutes`; None: until it is done."""
         time = [] if minutes is None else ["--minutes", f"{minutes:g}"]
         more = [word.format(seed=seed, keep=keep) for word in self.options]
         return ["-m", self.module, *more, *time, "--folder", str(folder)]

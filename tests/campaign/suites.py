@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from tests.campaign.progress import Limit, Round
 from tests.campaign.registry import CAMPAIGNS
-from tests.campaign.rounds import Limit, Round
 
 ROOT = Path(__file__).parents[2]
 FAILED_RETENTION = ("-o", "tmp_path_retention_policy=failed")

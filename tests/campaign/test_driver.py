@@ -16,7 +16,7 @@ from tests.campaign.example import FAULTS, Checkout
 ROOT = Path(__file__).parents[2]
 WORK = """
 import argparse, pathlib, sys
-from tests.campaign.rounds import Limit, Round
+from tests.campaign.progress import Limit, Round
 parser = argparse.ArgumentParser()
 for option in ("--minutes", "--folder", "--keep", "--points", "--seed"):
     parser.add_argument(option)

@@ -27,7 +27,7 @@ def test_it_says_what_it_does(campaign: Campaign) -> None:
 
 def marks() -> set[tuple[str, str]]:
     """`long` or `short`, and the campaign that a marker of a test names."""
-    # What tests of the runner write for a pytest of their own are no tests of a campaign.
+    # What tests of the runner write for their own pytest are no tests of a campaign.
     files = (f for f in (ROOT / "tests").rglob("*.py") if f.parent != ROOT / "tests/runner")
     return {found for file in files for found in MARK.findall(file.read_text(encoding="utf-8"))}
 

@@ -44,7 +44,7 @@ def test_payloads_that_help_together_are_told_with_their_plan(shelf: Path) -> No
 
 def test_words_that_come_with_what_would_help_are_no_mistake(shelf: Path) -> None:
     asked = ("advise", WRITTEN, "--host-of", "spot", "--wheelhouse", shelf)
-    assert "E-UNDECL" not in nondum(*asked).ok().out
+    assert "PDDL_UNKNOWN" not in nondum(*asked).ok().out
     assert nondum(*asked, "--json").ok().json["causes"] == []
 
 
@@ -111,7 +111,7 @@ def test_where_nothing_is_known_it_is_said_how_to_look_further() -> None:
     assert "no payload is known of; with --wheelhouse, others are looked through" in ran.out
 
 
-def test_words_that_nobody_knows_are_refused(shelf: Path) -> None:
+def test_unknown_words_are_refused(shelf: Path) -> None:
     asked = ("advise", "(wirtten self)", "--host-of", "spot", "--wheelhouse", shelf)
     nondum(*asked).refused(1, "did you mean 'written'?")
 
@@ -152,7 +152,7 @@ def fragments():
 """
 
 
-def test_payload_whose_fragments_are_wrong_is_left_out_by_name(tmp_path: Path, shelf: Path) -> None:
+def test_payload_with_wrong_fragments_is_left_out_by_name(tmp_path: Path, shelf: Path) -> None:
     make_payload(tmp_path, Part("broken", BROKEN), payload_id="org.example.broken")
     asked = ("--host-of", "spot", "--wheelhouse", tmp_path, "--wheelhouse", shelf)
     shown = nondum("advise", WRITTEN, *asked).ok().out
@@ -165,7 +165,7 @@ def test_payload_whose_fragments_are_wrong_is_left_out_by_name(tmp_path: Path, s
     assert len(found["ways"]) == 2
 
 
-def test_payload_is_of_use_without_its_component_whose_fragments_are_wrong(
+def test_payload_is_of_use_without_its_component_with_wrong_fragments(
     tmp_path: Path,
 ) -> None:
     parts = (talker(), scribe(), Part("broken", BROKEN))
@@ -241,4 +241,4 @@ def test_without_a_daemon_it_is_said_what_to_do(tmp_path: Path) -> None:
 def test_refusals_are_told_in_json_too(shelf: Path) -> None:
     ran = nondum("advise", "(wirtten self)", "--host-of", "spot", "--json")
     assert ran.code == 1
-    assert json.loads(ran.out)["problems"][0]["code"] == "E-UNDECL"
+    assert json.loads(ran.out)["problems"][0]["code"] == "PDDL_UNKNOWN"

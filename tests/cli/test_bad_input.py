@@ -41,7 +41,7 @@ MEANT = {0, 1, 2, 3, 4, 11, 12, 130}
 
 @pytest.fixture(autouse=True)
 def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to be in, a home without anything, no daemon, and nobody who answers questions."""
+    """A folder to be in, an empty home, no daemon, and no person who answers questions."""
     for name in ("HOME", "XDG_STATE_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR"):
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setenv("NONDUM_CONTROL", str(tmp_path / "control.sock"))

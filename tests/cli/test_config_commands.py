@@ -41,7 +41,7 @@ def test_all_problems_are_told_at_once_each_with_its_line(tmp_path: Path) -> Non
     ("text", "words"),
     [
         ("[host\n", "CONFIG_TOML"),
-        ('[host]\nsystem_tree = "nobody.knows:it"\n', "CONFIG_SYSTEM_TREE"),
+        ('[host]\nsystem_tree = "unknown.module:it"\n', "CONFIG_SYSTEM_TREE"),
     ],
 )
 def test_what_a_daemon_would_not_start_with_is_told(tmp_path: Path, text: str, words: str) -> None:

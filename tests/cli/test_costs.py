@@ -34,9 +34,7 @@ def test_the_dearest_is_named_first_and_what_is_shared_at_last() -> None:
         pytest.param(LARGE_BYTES, (ARM,), False, id="for one"),
     ],
 )
-def test_what_nobody_would_save_is_not_told(
-    size: int, costs: tuple[Cost, ...], is_told: bool
-) -> None:
+def test_only_a_large_saving_is_told(size: int, costs: tuple[Cost, ...], is_told: bool) -> None:
     assert bool(remark(listed(size), costs)) == is_told
 
 

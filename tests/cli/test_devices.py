@@ -1,4 +1,4 @@
-"""`nondum devices`: of one device somebody has, of one nobody, and of one that nobody gets."""
+"""`nondum devices`: of a device in use, of one that is not, and of one that is left alone."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_it_is_told_who_has_what_and_what_is_left_alone(daemon: RunningHost) -> 
     users = {row[0]: row[-1].strip() for row in rows(daemon)[1:]}
     assert users == {
         "keys": "left alone: it is a keyboard",
-        "knob": "nobody",
+        "knob": "no component",
         "line": "gauge (gauge)",
     }
 
@@ -60,7 +60,7 @@ def test_data_have_all_that_is_known(daemon: RunningHost) -> None:
 
 def test_why_tells_every_rule_and_what_was_found(daemon: RunningHost) -> None:
     said = daemon.run("devices", "--why", "knob").ok().out
-    assert "  used by: nobody\n" in said
+    assert "  used by: no component\n" in said
     assert "  gauge (gauge): does not match\n" in said
     assert "        ✗ ID_MODEL = Gauge: Knob\n" in said
     assert "✓ ID_MODEL = Gauge: Gauge" in daemon.run("devices", "--why", "line").ok().out

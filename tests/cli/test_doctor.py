@@ -49,7 +49,7 @@ def test_every_level_of_confinement_is_tried() -> None:
     assert all(row["available"] or (row["reason"] and row["fix"]) for row in told["levels"])
 
 
-def test_it_tells_which_disks_are_whose() -> None:
+def test_it_lists_the_owner_of_each_disk() -> None:
     """None of a machine without USB disks is a drive."""
     told = json.loads(nondum("doctor", "disks", "--json").ok().out)
     assert all(row["whose"] == "host" and row["why"] for row in told if not row["usb"])
@@ -60,7 +60,7 @@ def test_it_tells_which_disks_are_whose() -> None:
 
 
 def test_everything_is_looked_at_for_who_asks_for_nothing_in_particular(tmp_path: Path) -> None:
-    """And what is bad has an exit code of its own."""
+    """And bad findings have their own exit code."""
     with running(tmp_path, name="panther") as host:
         told = nondum("doctor", "--user", "--config", host.config, "--json")
         found = {one["check"]: one for one in told.json["findings"]}

@@ -60,7 +60,7 @@ def test_logs_go_on_with_what_is_written(daemon: RunningHost) -> None:
     daemon.run("logs", "baecon", "--follow").refused(1, "COMPONENT_UNKNOWN")
 
 
-def test_goals_and_facts_are_told_again_when_they_are_others(daemon: RunningHost) -> None:
+def test_changed_goals_and_facts_are_shown_again(daemon: RunningHost) -> None:
     with (
         daemon.started("goals", "--follow", "--json") as goals,
         daemon.started("facts", "--follow", "--json") as facts,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.daemon.plugins import scribe, talker
-from tests.kit.command_line import quiet_environment
+from tests.kit.command_line import clean_environment
 from tests.kit.payloads import installed_wheel, make_wheel, sdk_wheel
 from tests.kit.running_host import COMMAND, running
 from tests.kit.until import PATIENCE_S
@@ -52,7 +52,7 @@ def run_there(foreign: Path, *words: str | Path) -> None:
         cwd=foreign,
         capture_output=True,
         text=True,
-        env=quiet_environment(),
+        env=clean_environment(),
         timeout=PATIENCE_S,
         check=False,
     )

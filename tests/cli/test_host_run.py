@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.kit.command_line import Ran, command, nondum, quiet_environment
+from tests.kit.command_line import Ran, clean_environment, command, nondum
 from tests.kit.running_host import RunningHost, running
 
 
@@ -50,10 +50,10 @@ def test_a_name_is_held_to_the_rules_of_the_configuration(tmp_path: Path, name: 
 def test_a_system_tree_that_is_none_is_told(tmp_path: Path) -> None:
     config = RunningHost(tmp_path).config
     text = config.read_text(encoding="utf-8")
-    tree = '[host]\nsystem_tree = "nobody.knows:it"'
+    tree = '[host]\nsystem_tree = "unknown.module:it"'
     config.write_text(text.replace("[host]", tree), encoding="utf-8")
     ran = host_run("--config", config)
-    ran.refused(2, "CONFIG_SYSTEM_TREE").refused(2, "nobody.knows:it")
+    ran.refused(2, "CONFIG_SYSTEM_TREE").refused(2, "unknown.module:it")
 
 
 def test_a_state_folder_that_cannot_be_is_told(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_defaults_of_a_user_need_no_configuration(tmp_path: Path) -> None:
         command("host", "run", "--user", "--name", "lone-host"),
         stderr=subprocess.PIPE,
         text=True,
-        env=quiet_environment() | places,
+        env=clean_environment() | places,
     )
     assert process.stderr is not None
     with process:

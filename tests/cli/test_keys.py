@@ -94,9 +94,9 @@ MISTAKES = {
         ("allow", "bob.pub", "--payloads", "a.b", "--name", "alice"),
         "KEY_TAKEN",
     ),
-    "nobody of that name": (("revoke", "eve"), "KEY_UNKNOWN"),
+    "no key of that name": (("revoke", "eve"), "KEY_UNKNOWN"),
     "the last root": (("revoke", "alice"), "ROOTS_TOO_FEW"),
-    "nobody to replace": (("rotate", "eve", "bob.pub"), "KEY_UNKNOWN"),
+    "no key to replace": (("rotate", "eve", "bob.pub"), "KEY_UNKNOWN"),
 }
 
 
@@ -140,7 +140,7 @@ def test_a_host_is_given_its_trust_and_keeps_to_it(owner: Path) -> None:
     make_payload(drive, Part("beacon", BEACON), payload_id=BEACON_ID)
     with running(owner / "host", trust=owner / "etc/trust.toml") as host:
         begin = ("keys", "trust", trust, "--config", host.config)
-        assert "trusts nobody" in host.run("status").ok().out
+        assert "trusts no key" in host.run("status").ok().out
         host.run("payload", "install", drive).refused(1, "SIG_MISSING")
         nondum("payload", "sign", drive, "--key", alice).ok()
         host.run("payload", "install", drive).refused(1, "SIG_UNTRUSTED")

@@ -1,4 +1,4 @@
-"""`nondum lab`: hands a payload to the laboratory of a checkout, or says that there is none."""
+"""`nondum lab`: runs a payload in the laboratory of a checkout, or says that there is none."""
 
 from __future__ import annotations
 

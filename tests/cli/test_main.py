@@ -1,4 +1,4 @@
-"""The command line itself: help, exit codes, and what it does when nobody listens."""
+"""The command line itself: help, exit codes, and what it does without a daemon."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 import pytest
 from tests.cli.conftest import Answering
-from tests.kit.command_line import command, in_terminal, nondum, quiet_environment
+from tests.kit.command_line import clean_environment, command, in_terminal, nondum
 
 from nondum.cli.main import COMMANDS, cli
 
@@ -53,7 +53,7 @@ Commands:
   mount       Tell where on the body a unit is mounted.
   payload     Make, judge and install payloads.
   pddl        Check, merge and plan PDDL files, without a host.
-  peers       Other hosts: who is here, and whom this host trusts.
+  peers       Other hosts: which are here, and which this host trusts.
   place       Payloads that run on another host, and where one is to run.
   plan        The plans that are being carried out, that of the most urgent goal first.
   retry       Try again what was refused or quarantined.
@@ -61,7 +61,7 @@ Commands:
   status      The host, its payloads and its goals at a glance.
   stop        Stop this host and its peers at once.
   store       The wheels that this host keeps.
-  streams     Who sends what to whom, and what is sent.
+  streams     The streams: their producers, readers and messages.
   tree        The behaviour tree as it is being ticked, and why.
   units       What the robot has to act with.
   watch       One live screen: what is wrong, goals, plan, parts, streams.
@@ -244,7 +244,7 @@ def test_a_daemon_that_goes_while_it_is_followed_is_told(answering: Answering) -
 
 
 def test_names_are_asked_for_again_only_when_another_one_is_shown(answering: Answering) -> None:
-    """The daemon answers as often as it is asked here: who asks once more finds nobody."""
+    """The daemon answers as often as it is asked here: one more call finds no daemon."""
     other = TREE.replace(WHY.encode(), b"rover__eye__camera")
     assert other != TREE
     named = b'{"result":{"rover__eye__camera":"camera"}}\n'
@@ -262,7 +262,7 @@ def test_ctrl_c_ends_following_in_silence(answering: Answering) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=quiet_environment() | {"PYTHONUNBUFFERED": "1"},
+        env=clean_environment() | {"PYTHONUNBUFFERED": "1"},
     )
     assert process.stdout is not None
     assert '"name":"nondum"' in process.stdout.readline()

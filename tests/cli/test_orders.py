@@ -63,7 +63,7 @@ def test_a_goal_is_reached_while_another_is_kept_up(daemon: RunningHost) -> None
     assert reached.split("  ")[1:] == ["(greeted person panther)", "reached", "it holds\n"]
 
 
-def test_whoever_gives_a_goal_is_told_which_it_replaces(daemon: RunningHost) -> None:
+def test_answer_to_a_goal_names_the_goals_that_it_replaces(daemon: RunningHost) -> None:
     first = daemon.run("goal", "shine", "--wait", "--json").ok().json
     assert first["replaces"] == []
     second = daemon.run("goal", "shine", "--json").ok().json
@@ -84,8 +84,8 @@ def test_words_that_ask_for_nothing_are_refused_with_the_nearest(daemon: Running
     daemon.run("goal", "shien", "brightly").refused(1, "PHRASE_")
 
 
-def test_pddl_amiss_is_refused_with_a_caret(daemon: RunningHost) -> None:
-    ran = daemon.run("goal", "--pddl", "(lit nobody)").refused(1, "(lit nobody)\n")
+def test_wrong_pddl_is_refused_with_a_caret(daemon: RunningHost) -> None:
+    ran = daemon.run("goal", "--pddl", "(lit stranger)").refused(1, "(lit stranger)\n")
     assert ran.err.rstrip().endswith("^\n→ declare it, or correct its spelling")
 
 
@@ -98,7 +98,7 @@ def test_a_goal_without_a_plan_says_what_is_missing(daemon: RunningHost) -> None
     assert "WHY_" in daemon.run("why").ok().out
 
 
-def test_halting_one_goal_leaves_the_others(daemon: RunningHost) -> None:
+def test_halting_one_goal_leaves_the_rest(daemon: RunningHost) -> None:
     first = daemon.run("goal", "shine", "--wait", "--json").ok().json["id"]
     second = daemon.run("goal", "--pddl", "(reported person self)", "--json").ok().json["id"]
     halted = daemon.run("halt", "--goal", second, "--json").ok().json
@@ -262,7 +262,7 @@ def test_a_payload_is_taken_back_to_the_release_before(daemon: RunningHost) -> N
     assert "2 (was 1)" in shown
     assert "superseded" in shown
     gone_back = daemon.run("payload", "rollback", TORCH_ID).ok().out
-    assert gone_back == f"{TORCH_ID} 1.0 is in force, release 1 (gone back from 2)\n"
+    assert gone_back == f"{TORCH_ID} 1.0 is active, release 1 (gone back from 2)\n"
     warned = f"{TORCH_ID} is at release 1: a person went back to it"
     assert warned in daemon.run("status").ok().out
     assert "1 (gone back from 2)" in daemon.run("components").ok().out
@@ -299,7 +299,7 @@ def test_a_question_typed_is_answered_and_no_goal(daemon: RunningHost, verb: str
     before = daemon.run("goals", "--json").ok().json["given"]
     assert daemon.run(verb, "What can you do?").ok().out == "I can greet people and shine.\n"
     told = daemon.run(verb, "panther,", "what are you doing", "--json").ok().json
-    assert told == {"answer": "I do nothing: nobody has asked for anything."}
+    assert told == {"answer": "I do nothing: no one has asked for anything."}
     assert daemon.run("goals", "--json").ok().json["given"] == before
     assert told["answer"] in [row["text"] for row in daemon.ask("status")["told"]]
 

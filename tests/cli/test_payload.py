@@ -78,7 +78,7 @@ def test_a_sound_drive_is_accepted(drive: Path) -> None:
     assert ran.out.endswith("accepted\n")
     said = nondum("payload", "check", drive / "nondum" / BEACON_ID, "--json").ok().json
     assert (said["ok"], said["problems"]) == (True, [])
-    assert {warning["code"] for warning in said["warnings"]} == {"W-OWN-WORD"}
+    assert {warning["code"] for warning in said["warnings"]} == {"PDDL_OWN_WORD"}
 
 
 def test_a_terminal_shows_how_far_judging_is(drive: Path) -> None:
@@ -121,7 +121,7 @@ def test_an_empty_drive_says_what_a_payload_is(tmp_path: Path) -> None:
 
 
 def test_version_that_goes_down_is_remarked_on(tmp_path: Path) -> None:
-    """Hosts go by the release, which is newer; whoever builds may have taken the wrong sources."""
+    """Hosts go by the release, which is newer; the build may have used the wrong sources."""
     wheels = tmp_path / "wheels"
     wheels.mkdir()
     for wheel in (sdk_wheel(), installed_wheel("pluggy")):
@@ -142,7 +142,7 @@ def test_a_package_that_is_none_cannot_be_built(tmp_path: Path) -> None:
     ran.refused(1, "error: ")
 
 
-def test_nobody_builds_for_such_machines(tmp_path: Path) -> None:
+def test_build_for_an_unknown_architecture_is_refused(tmp_path: Path) -> None:
     ran = nondum("payload", "build", tmp_path, "-o", tmp_path / "d", "--arch", "vax")
     ran.refused(2, "TARGET_UNKNOWN")
 

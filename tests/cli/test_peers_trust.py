@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from tests.host.peers.hints import Network
-from tests.kit.command_line import Ran, command, nondum, quiet_environment
+from tests.kit.command_line import Ran, clean_environment, command, nondum
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import ControlServer
@@ -36,9 +36,9 @@ CODE = re.compile(r"code  (\d{3} \d{3})")
 
 @dataclass(frozen=True)
 class Host:
-    """What a daemon does of peers, behind a control socket of its own."""
+    """The peer part of a daemon, behind its own control socket."""
 
-    keeper: PeerTrustStore
+    trust_store: PeerTrustStore
     control: Path
     known: dict[PeerKey, str]
 
@@ -54,7 +54,7 @@ class Host:
             stdin=theirs,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
-            env=quiet_environment() | {"PYTHONUNBUFFERED": "1"},
+            env=clean_environment() | {"PYTHONUNBUFFERED": "1"},
         )
         os.close(theirs)
         try:
@@ -97,16 +97,18 @@ class Typing:
 @contextlib.asynccontextmanager
 async def host(root: Path, name: str, network: Network) -> AsyncIterator[Host]:
     folder = root / name
-    keeper = await PeerTrustStore.open(folder / "peers", name)
-    requests = PairingRequests(keeper, announce=network.tells(keeper), candidates=network.all)
+    trust_store = await PeerTrustStore.open(folder / "peers", name)
+    requests = PairingRequests(
+        trust_store, announce=network.tells(trust_store), candidates=network.all
+    )
     known: dict[PeerKey, str] = {}
-    orders = TrustOrders(keeper, requests, lambda: known)
+    orders = TrustOrders(trust_store, requests, lambda: known)
     answering = {n: _parsing(v) for n, v in trust_orders.answering(orders).items()}
     following = {n: _parsing(v) for n, v in trust_orders.following(orders).items()}
     server = ControlServer(folder / "control.sock", answering, following)
     await server.open()
     try:
-        yield Host(keeper, folder / "control.sock", known)
+        yield Host(trust_store, folder / "control.sock", known)
     finally:
         await server.close()
 
@@ -135,14 +137,14 @@ async def test_two_people_pair_their_hosts(both: tuple[Host, Host]) -> None:
         assert await there.shows(CODE) == code
         await here.shows(r"Does base show the same code\? \[y/N\]: ")
         await there.shows("Does rover show the same code")
-        assert fingerprint(base.keeper.key) in here.shown
+        assert fingerprint(base.trust_store.key) in here.shown
         here.types("y")
         await here.shows("waiting for the person at base")
         there.types("yes")
         assert (await here.ends(), await there.ends()) == (0, 0)
-        assert f"paired with base  {fingerprint(base.keeper.key)}" in here.shown
-    assert base.keeper.trust.paired == {rover.keeper.key: "rover"}
-    assert rover.keeper.trust.paired == {base.keeper.key: "base"}
+        assert f"paired with base  {fingerprint(base.trust_store.key)}" in here.shown
+    assert base.trust_store.trust.paired == {rover.trust_store.key: "rover"}
+    assert rover.trust_store.trust.paired == {base.trust_store.key: "base"}
 
 
 @pytest.mark.parametrize("answer", ["n", "", "yess", "123456"])
@@ -155,7 +157,7 @@ async def test_anything_but_yes_is_no(both: tuple[Host, Host], answer: str) -> N
         assert (await here.ends(), await there.ends()) == (1, 1)
         assert "error: PAIRING_REFUSED" in here.shown
         assert "error: PAIRING_REFUSED rover: the person at the other host said no" in there.shown
-    assert rover.keeper.trust == base.keeper.trust == Trust()
+    assert rover.trust_store.trust == base.trust_store.trust == Trust()
 
 
 async def test_person_who_leaves_takes_the_question_back(both: tuple[Host, Host]) -> None:
@@ -192,63 +194,63 @@ async def test_scripts_say_yes_by_the_code(both: tuple[Host, Host]) -> None:
 
 
 async def test_yes_without_a_window_is_refused(rover: Host) -> None:
-    (await rover.run("pair", "--yes-code", "123 456")).refused(1, "PAIRING_ORDER nobody is")
+    (await rover.run("pair", "--yes-code", "123 456")).refused(1, "PAIRING_ORDER no pairing")
     (await rover.run("pair", "base", "--yes-code", "123 456")).refused(2, "name no host")
 
 
 async def test_trust_is_listed_by_fingerprint(rover: Host) -> None:
     empty = (await rover.run("trust")).ok().out
-    assert f"this host is rover  {fingerprint(rover.keeper.key)}" in empty
-    assert "nobody is trusted yet" in empty
+    assert f"this host is rover  {fingerprint(rover.trust_store.key)}" in empty
+    assert "no host is trusted yet" in empty
     base, lost = HostKeys.generate().public, HostKeys.generate().public
-    await rover.keeper.pair(base, "base")
-    await rover.keeper.revoke(lost, "stolen (old)")
+    await rover.trust_store.pair(base, "base")
+    await rover.trust_store.revoke(lost, "stolen (old)")
     lines = [line.split() for line in (await rover.run("trust")).ok().out.splitlines()]
     assert ["paired", "base", fingerprint(base), "-"] in lines
     assert ["revoked", "-", fingerprint(lost), "stolen", "(old)"] in lines
     view = (await rover.run("trust", "--json")).ok().json
     assert view["paired"] == [{"name": "base", "fingerprint": fingerprint(base), "key": base}]
-    assert str(rover.keeper.identity().keys) not in json.dumps(view)
+    assert str(rover.trust_store.identity().keys) not in json.dumps(view)
 
 
 async def test_host_is_revoked_by_name(rover: Host) -> None:
     base = HostKeys.generate().public
-    await rover.keeper.pair(base, "base")
+    await rover.trust_store.pair(base, "base")
     ran = await rover.run("revoke", "base", "--why", "stolen in the field")
     assert ran.ok().out == f"revoked: base  {fingerprint(base)}\n"
-    assert rover.keeper.trust == Trust(revoked={base: "stolen in the field (base)"})
+    assert rover.trust_store.trust == Trust(revoked={base: "stolen in the field (base)"})
     undone = await rover.run("forget", fingerprint(base).lower())
     assert "forgotten: the revocation" in undone.ok().out
-    assert rover.keeper.trust == Trust()
+    assert rover.trust_store.trust == Trust()
 
 
 async def test_host_that_a_fleet_let_in_is_revoked_by_name(rover: Host) -> None:
     base = HostKeys.generate().public
     rover.known[base] = "base"
     (await rover.run("revoke", "base", "--why", "sold")).ok()
-    assert rover.keeper.trust.revoked == {base: "sold (base)"}
+    assert rover.trust_store.trust.revoked == {base: "sold (base)"}
 
 
 async def test_host_that_was_never_met_is_revoked_by_its_key(rover: Host) -> None:
     base = HostKeys.generate().public
     (await rover.run("revoke", base, "--why", "stolen")).ok()
-    assert rover.keeper.trust.revoked == {base: "stolen"}
+    assert rover.trust_store.trust.revoked == {base: "stolen"}
 
 
 async def test_name_of_two_hosts_is_told_apart_by_fingerprint(rover: Host) -> None:
     old, new = HostKeys.generate().public, HostKeys.generate().public
-    await rover.keeper.pair(old, "base")
-    await rover.keeper.pair(new, "base")
+    await rover.trust_store.pair(old, "base")
+    await rover.trust_store.pair(new, "base")
     (await rover.run("revoke", "base", "--why", "old")).refused(1, fingerprint(old))
     (await rover.run("forget", fingerprint(old))).ok()
-    assert rover.keeper.trust.paired == {new: "base"}
+    assert rover.trust_store.trust.paired == {new: "base"}
 
 
 async def test_unknown_host_and_own_key_are_refused(rover: Host) -> None:
-    (await rover.run("revoke", "nobody", "--why", "x")).refused(1, "PEER_UNKNOWN")
-    (await rover.run("forget", "nobody")).refused(1, "known are: none")
-    (await rover.run("revoke", rover.keeper.key, "--why", "x")).refused(1, "KEY_OWN")
-    (await rover.run("revoke", "nobody")).refused(2, "--why")
+    (await rover.run("revoke", "ghost", "--why", "x")).refused(1, "PEER_UNKNOWN")
+    (await rover.run("forget", "ghost")).refused(1, "known are: none")
+    (await rover.run("revoke", rover.trust_store.key, "--why", "x")).refused(1, "KEY_OWN")
+    (await rover.run("revoke", "ghost")).refused(2, "--why")
 
 
 async def test_fleet_is_made_carried_and_trusted(rover: Host, tmp_path: Path) -> None:
@@ -259,8 +261,8 @@ async def test_fleet_is_made_carried_and_trusted(rover: Host, tmp_path: Path) ->
     fleet = made.ok().json
     assert stat.S_IMODE((drawer / "fleet.key").stat().st_mode) == 0o600
     key = (await rover.run("key", "-o", tmp_path / "rover.pub")).ok().out
-    assert f"fingerprint {fingerprint(rover.keeper.key)}\n" in key
-    assert parse_host((tmp_path / "rover.pub").read_text()) == rover.keeper.host
+    assert f"fingerprint {fingerprint(rover.trust_store.key)}\n" in key
+    assert parse_host((tmp_path / "rover.pub").read_text()) == rover.trust_store.host
     signing = (
         "keys",
         "fleet",
@@ -272,28 +274,30 @@ async def test_fleet_is_made_carried_and_trusted(rover: Host, tmp_path: Path) ->
         certificate,
     )
     signed = await asyncio.to_thread(nondum, *signing, "--days", "30")
-    assert f"{certificate}  rover  {fingerprint(rover.keeper.key)}  until 20" in signed.ok().out
+    assert (
+        f"{certificate}  rover  {fingerprint(rover.trust_store.key)}  until 20" in signed.ok().out
+    )
     certified = await rover.run("certify", certificate)
     assert certified.code == 0
     assert "warning: FLEET_UNTRUSTED" in certified.err
-    assert rover.keeper.trust == Trust()
+    assert rover.trust_store.trust == Trust()
     trusted = (await rover.run("trust-fleet", public)).ok().out
     assert trusted == f"trusted: the fleet survey  {fleet['fingerprint']}\n"
     shown = (await rover.run("trust")).ok().out
     assert "certified by survey until 20" in shown
-    held = rover.keeper.certificate
+    held = rover.trust_store.certificate
     assert held is not None
-    rover.keeper.trust.admit(rover.keeper.key, held.to_bytes(), datetime.now(UTC))
+    rover.trust_store.trust.admit(rover.trust_store.key, held.to_bytes(), datetime.now(UTC))
     assert held.not_after - datetime.now(UTC) > timedelta(days=29)
     (await rover.run("forget", "survey")).ok()
-    assert rover.keeper.trust == Trust()
+    assert rover.trust_store.trust == Trust()
 
 
 async def test_fleet_may_be_called_something_else_here(rover: Host, tmp_path: Path) -> None:
     nondum("keys", "fleet", "new", tmp_path / "f", "--name", "survey").ok()
     public = tmp_path / "f" / "fleet.pub"
     (await rover.run("trust-fleet", public, "--name", "theirs")).ok()
-    assert list(rover.keeper.trust.fleets.values()) == ["theirs"]
+    assert list(rover.trust_store.trust.fleets.values()) == ["theirs"]
     (await rover.run("trust-fleet", public, "--name", "Not A Name")).refused(1, "HOST_NAME")
 
 

@@ -128,8 +128,8 @@ brightness  scalar  beacon     no       -     -
 """
 FACTS = """\
 FACT                    SINCE  SOURCE                                       VALUE
-free brightness         AGE    nobody uses it                               -
-idle lamp               AGE    nobody uses it                               -
+free brightness         AGE    nothing uses it                              -
+idle lamp               AGE    nothing uses it                              -
 on lamp panther         AGE    beacon is plugged into panther               -
 output lamp brightness  AGE    beacon declares it                           -
 ready lamp              AGE    beacon is healthy and its devices are there  -
@@ -240,7 +240,7 @@ def test_the_journal_tells_a_payload_step_by_step(daemon: RunningHost) -> None:
 
 
 def test_the_journal_is_silent_of_strangers(daemon: RunningHost) -> None:
-    shown = daemon.run("journal", "--subject", "nobody").ok().out
+    shown = daemon.run("journal", "--subject", "stranger").ok().out
     assert shown == "the journal says nothing of it\n"
 
 
@@ -280,7 +280,7 @@ def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: RunningHost) ->
     untrue = daemon.run("facts", "--why", f"flowing {BRIGHTNESS}").ok().out
     assert untrue == (
         "(flowing brightness) does not hold\n"
-        "nobody has said so\n"
+        "no source has said so\n"
         "would be made true by: test-beacon.shine\n"
     )
 
@@ -291,7 +291,7 @@ def test_names_are_short_for_people_and_whole_in_json(daemon: RunningHost) -> No
     assert rows(daemon, "streams")[0]["stream"] == BRIGHTNESS
 
 
-def test_a_fact_amiss_gets_the_nearest_words(daemon: RunningHost) -> None:
+def test_a_wrong_fact_gets_the_nearest_words(daemon: RunningHost) -> None:
     assert "did you mean 'flowing'?" in daemon.run("facts", "--why", "flowin x").ok().out
     assert "did you mean 'panther'?" in daemon.run("facts", "--why", "(lit panter)").ok().out
     arity = daemon.run("facts", "--why", "lit", "--json").ok().json

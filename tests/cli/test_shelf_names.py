@@ -48,7 +48,7 @@ def told(**more: Any) -> dict[str, Any]:
     }
 
 
-def test_payload_whose_component_has_the_id_of_one_here_helps() -> None:
+def test_payload_with_the_component_id_of_one_here_helps() -> None:
     around = Surroundings.of(told(), [on_shelf("org.y", "warm")])
     [way] = around.counsel("(warm self)").advice.ways
     assert [(p.id, [c.component for c in p.contributions]) for p in way.payloads] == [

@@ -16,7 +16,7 @@ NUMBERS = itertools.count()
 OTHERS = """
 [[component]]
 id = "other"
-distribution = "nobody-has-it"
+distribution = "third-party"
 """
 
 
@@ -46,7 +46,7 @@ def codes(source: Path) -> list[str]:
 
 
 WRONG: dict[str, tuple[str, Callable[[Path], None]]] = {
-    "fragment": ("E-UNDECL", lambda s: change(s, DOMAIN, ":effect (lit", ":effect (litt")),
+    "fragment": ("PDDL_UNKNOWN", lambda s: change(s, DOMAIN, ":effect (lit", ":effect (litt")),
     "phrase": ("PHRASE_INVALID", lambda s: change(s, PLUGIN, "(lit self)", "(litt self)")),
     "manifest": ("MANIFEST_KEY", lambda s: change(s, "payload.toml", "summary", "sumary")),
     "device": (
@@ -81,7 +81,7 @@ def test_what_hosts_would_refuse_is_told(
     assert codes(source) == [code]
 
 
-def test_what_was_made_anew_is_in_order(source: Path) -> None:
+def test_new_source_has_no_problems(source: Path) -> None:
     assert codes(source) == []
 
 
@@ -101,13 +101,13 @@ def test_all_components_are_told_at_once(source: Path) -> None:
 def test_an_installed_distribution_may_have_the_plugin(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    info = tmp_path / "nobody_has_it-1.dist-info"
+    info = tmp_path / "third_party-1.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: nobody-has-it\nVersion: 1\n")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: third-party\nVersion: 1\n")
     points = f"[nondum.plugins]\nother = nondum_{source.name}.plugin\n"
     (info / "entry_points.txt").write_text(points)
     monkeypatch.syspath_prepend(tmp_path)
     change(
-        source, "payload.toml", f'distribution = "{source.name}"', 'distribution = "nobody-has-it"'
+        source, "payload.toml", f'distribution = "{source.name}"', 'distribution = "third-party"'
     )
     assert codes(source) == []

@@ -152,5 +152,5 @@ def test_robot_that_is_asked_says_what_it_can_do(tmp_path: Path) -> None:
 
 
 def are_ready(view: View, count: int) -> bool:
-    """Whether there are so many components, all ready."""
+    """Whether there are `count` components, all ready."""
     return [row["ready"] for row in view["components"]] == [True] * count

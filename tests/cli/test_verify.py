@@ -56,7 +56,7 @@ def test_every_problem_has_its_four_keys(drive: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["verify", "check", "inspect"])
-def test_versions_without_end_are_refused_as_others_are(drive: Path, verb: str) -> None:
+def test_endless_versions_are_refused_like_other_wrong_ones(drive: Path, verb: str) -> None:
     listed = drive / "nondum" / ID / "CONTENTS"
     text = listed.read_text()
     assert "version: 1.0\n" in text
@@ -76,12 +76,12 @@ def test_signatures_may_be_left_unasked(drive: Path) -> None:
     assert nondum("payload", "check", drive).ok().out.endswith("accepted\n")
 
 
-def test_whose_signatures_hold_is_told_though_nobody_is_asked_to_trust_them(
+def test_valid_signatures_are_told_although_no_trust_is_asked_for(
     drive: Path, tmp_path: Path
 ) -> None:
     nondum("keys", "new", tmp_path / "alice").ok()
     told = nondum("payload", "check", drive, "--anywhere").ok().out
-    assert told.startswith(f"{ID}: nobody has signed it\n")
+    assert told.startswith(f"{ID}: no one has signed it\n")
     nondum("payload", "sign", drive, "--key", tmp_path / "alice").ok()
     (key,) = nondum("payload", "check", drive, "--anywhere", "--json").ok().json["signers"][ID]
     assert key.startswith("SHA256:")

@@ -50,7 +50,7 @@ def step(number: int, state: str = "kept") -> dict[str, Any]:
 
 
 def full(count: int) -> dict[str, Any]:
-    """What a host shows that has so many of everything."""
+    """What a host shows that has `count` of everything."""
     numbers = range(count)
     goal = {"text": "follow me", "state": "suspended", "holds": False, "reason": LONG}
     part = {"host": "rover", "state": "ready", "ready": True, "version": "1.0", "problem": ""}
@@ -84,12 +84,12 @@ def test_whatever_there_is_fits_the_screen(count: int, width: int, height: int) 
 
 
 @given(st.integers(0, 60), st.lists(st.integers(0, 40), max_size=8))
-def test_lines_are_shared_so_that_nobody_goes_without_for_another(
-    room: int, wanted: list[int]
+def test_lines_are_shared_so_that_no_section_goes_without_for_another(
+    space: int, wanted: list[int]
 ) -> None:
-    counts = shared(room, wanted)
+    counts = shared(space, wanted)
     assert all(count <= most for count, most in zip(counts, wanted, strict=True))
-    assert sum(count + 1 for count in counts if count) <= room
+    assert sum(count + 1 for count in counts if count) <= space
     cut = [count for count, most in zip(counts, wanted, strict=True) if count < most]
     assert all(count <= least + 2 for least in cut for count in counts)
 

@@ -29,17 +29,17 @@ T = TypeVar("T")
 class _Idle:
     """Does nothing for peers."""
 
-    def serve(self, errand: IncomingCall) -> Body:
+    def serve(self, incoming: IncomingCall) -> Body:
         return {}
 
     def notice(self, *_: Any) -> None: ...
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 
 class Guest:
-    """A member of a mesh in development mode, on a loop in a thread of its own."""
+    """A member of a mesh in development mode, on an event loop in its own thread."""
 
     def __init__(self, name: str, handler: Handler | None = None) -> None:
         """`handler` does what hosts ask of it; by default, nothing."""

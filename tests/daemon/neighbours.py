@@ -13,7 +13,7 @@ from tests.kit.running_host import READY_S, RunningHost
 from tests.transport.fleet.fleets import router
 
 UNCONFINED = '[workers]\nconfinement = "none"\n\n'
-"""Plugins of these tests write down beside their rooms what they are made to do."""
+"""Plugins of these tests write a log file outside their sandboxes."""
 
 
 @contextmanager
@@ -156,7 +156,7 @@ def note(ctx, word):
 '''
 
 
-EAR = '''"""Hears what somebody writes into a file."""
+LISTENER = '''"""Hears what somebody writes into a file."""
 import asyncio
 from pathlib import Path
 from nondum.sdk import hookimpl
@@ -172,13 +172,13 @@ async def listen(ctx):
 '''
 
 
-def ear(said: Path) -> Part:
-    """Something that listens; a person says something by `say`."""
-    return Part("ear", EAR.replace("FILE", str(said)))
+def listener(said: Path) -> Part:
+    """A payload with a `listen` hook; a person says something to it by `say`."""
+    return Part("listener", LISTENER.replace("FILE", str(said)))
 
 
 def say(said: Path, words: str) -> None:
-    """Say something to an ear."""
+    """Say something to a listener."""
     written = said.with_suffix(".part")
     written.write_text(words, encoding="utf-8")
     written.rename(said)

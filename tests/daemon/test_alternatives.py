@@ -33,7 +33,7 @@ def test_task_goes_on_with_the_other_when_one_is_pulled(host: RunningHost) -> No
     assert host.until_told("plan for '(written spot)', because")
     kept = {row["component"]: row["pid"] for row in host.view["components"]}
     assert kept == {name: pid for name, pid in pids.items() if name != used}
-    host.until("the other is heard", heard_by_scribe, timeout_s=READY_S)
+    host.until("the other is heard", read_by_scribe_alone, timeout_s=READY_S)
 
 
 def test_alternative_that_comes_later_leaves_the_task_alone(host: RunningHost) -> None:
@@ -48,7 +48,7 @@ def test_alternative_that_comes_later_leaves_the_task_alone(host: RunningHost) -
     assert not ended
 
 
-def test_better_one_is_taken_anew_and_the_other_when_it_is_killed(host: RunningHost) -> None:
+def test_next_goal_takes_the_better_one_and_the_other_when_it_is_killed(host: RunningHost) -> None:
     host.bring("write", scribe())
     host.bring("dear", costing(talker("dear"), 60))
     goal = host.want("(written spot)")
@@ -89,6 +89,6 @@ def used_in(plan: dict[str, str]) -> str | None:
     return names[0] if names else None
 
 
-def heard_by_scribe(view: Row) -> bool:
+def read_by_scribe_alone(view: Row) -> bool:
     """Whether there is one stream, and the scribe alone reads it."""
     return [stream["consumers"] for stream in view["streams"]] == [["scribe"]]

@@ -1,4 +1,4 @@
-"""Bad payloads as a person meets them: one clear error with its code, and nobody else notices."""
+"""Bad payloads as a person meets them: one clear error with its code, and all else goes on."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
 
 
 @pytest.fixture
-def nobody_notices(host: RunningHost) -> Iterator[None]:
+def healthy_go_on(host: RunningHost) -> Iterator[None]:
     """What is healthy works on as if nothing had happened, and nothing bad stays when pulled."""
     traces, workers, steps = host.traces(), healthy(host), host.view["plan"]["steps"]
     known = len(host.journal("scribe"))
@@ -47,7 +47,7 @@ def nobody_notices(host: RunningHost) -> Iterator[None]:
     assert host.traces() == traces
 
 
-@pytest.mark.usefixtures("nobody_notices")
+@pytest.mark.usefixtures("healthy_go_on")
 @pytest.mark.parametrize(
     "bad", [bad for bad in WAYS if bad.id in ONE_OF_EACH_PHASE], ids=lambda bad: bad.id
 )
@@ -78,7 +78,7 @@ def test_plugin_that_hangs_when_it_starts_is_given_up(tmp_path: Path) -> None:
         until_nothing_is_left(host, before)
 
 
-@pytest.mark.usefixtures("nobody_notices")
+@pytest.mark.usefixtures("healthy_go_on")
 def test_plugin_that_ends_again_and_again_is_quarantined(host: RunningHost, tmp_path: Path) -> None:
     make_payload(tmp_path / "bad", bare(EXITS_LATER), payload_id=BAD)
     host.plug(tmp_path / "bad")
@@ -88,7 +88,7 @@ def test_plugin_that_ends_again_and_again_is_quarantined(host: RunningHost, tmp_
     assert "WORKER_CRASH_LOOP" in str(host.journal("bad"))
 
 
-@pytest.mark.usefixtures("nobody_notices")
+@pytest.mark.usefixtures("healthy_go_on")
 def test_command_line_shows_what_is_wrong(host: RunningHost, tmp_path: Path) -> None:
     make_payload(
         tmp_path / "bad", bare(""), payload_id=BAD, requires='python = ">=3.99"', release=2

@@ -94,7 +94,7 @@ def test_device_that_comes_after_its_component_is_as_good(
     host.until_goal(goal, "holds")
 
 
-def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(
+def test_one_device_for_two_stays_with_its_first_user_and_that_is_told(
     host: RunningHost, plug_gauge: Plug
 ) -> None:
     plug_gauge()
@@ -103,7 +103,7 @@ def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(
     host.bring("first", gauge("first"))
     host.until_component("first", WAITS)
     told = host.until_told("second has the device port-1, which first would need too")
-    assert told.endswith("it stays with whoever has it, and a free one goes to the first by name")
+    assert told.endswith("it stays with that component; a free device goes to the first by name")
     (row,) = host.ask("devices")
     assert (row["component"], row["contested_by"]) == ("second", ["first"])
     slots.unplug(host.devices, "port-1")
@@ -115,7 +115,7 @@ def test_one_device_for_two_stays_with_whoever_has_it_and_that_is_told(
     host.until_component("second", "ready")
 
 
-def test_device_that_nobody_needs_is_never_opened(host: RunningHost, plug_gauge: Plug) -> None:
+def test_device_that_is_not_needed_is_never_opened(host: RunningHost, plug_gauge: Plug) -> None:
     """The kernel tells the other end of a line once anybody has opened and closed it."""
     line, slave = unopened_line()
     try:

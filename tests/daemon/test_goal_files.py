@@ -1,4 +1,4 @@
-"""A goal on a drive: wanted while it is plugged in, if whoever signed it may want things here."""
+"""A goal on a drive: pursued while the drive is in, if its signer may give goals to this host."""
 
 from __future__ import annotations
 
@@ -56,18 +56,18 @@ def host(one_trusting: Shared[list[RunningHost]]) -> Iterator[RunningHost]:
         yield host
 
 
-def call_name(host: RunningHost) -> str:
+def delivery_name(host: RunningHost) -> str:
     """Another one for each test: goals that are over stay known by their payload."""
-    return f"errand-{host.release}"
+    return f"delivery-{host.release}"
 
 
-def call_id(host: RunningHost) -> str:
-    return f"org.example.{call_name(host)}"
+def delivery_id(host: RunningHost) -> str:
+    return f"org.example.{delivery_name(host)}"
 
 
 def wanted(host: RunningHost, number: int = 1) -> str:
-    """The id of a goal of the errand."""
-    return f"{call_id(host)}/{number}"
+    """The id of a goal of the delivery."""
+    return f"{delivery_id(host)}/{number}"
 
 
 def beacon(host: RunningHost) -> None:
@@ -80,10 +80,10 @@ def beacon(host: RunningHost) -> None:
     host.until_step("beacon", "active")
 
 
-def errand(host: RunningHost, *goals: str, signer: Key | None = ALICE) -> Path:
+def delivery(host: RunningHost, *goals: str, signer: Key | None = ALICE) -> Path:
     """A drive with goals only."""
-    drive = host.work / "drives/errand"
-    folder = goal_payload.write(drive, call_id(host), goals, release=1)
+    drive = host.work / "drives/delivery"
+    folder = goal_payload.write(drive, delivery_id(host), goals, release=1)
     if signer is not None:
         sign_payload(folder, signer)
     return drive
@@ -103,7 +103,7 @@ def until_over(host: RunningHost, id: str) -> Row:
 
 def test_a_goal_is_pursued_while_its_drive_is_in(host: RunningHost) -> None:
     beacon(host)
-    name = host.plug(errand(host, "shine"))
+    name = host.plug(delivery(host, "shine"))
     assert host.until_goal(wanted(host), "holds")["text"] == "shine"
     host.until_runs("shine")
     host.pull(name)
@@ -113,7 +113,7 @@ def test_a_goal_is_pursued_while_its_drive_is_in(host: RunningHost) -> None:
 
 def test_a_drive_that_comes_back_gives_its_goal_again(host: RunningHost) -> None:
     beacon(host)
-    drive = errand(host, "shine")
+    drive = delivery(host, "shine")
     for _ in range(2):
         name = host.plug(drive)
         host.until_goal(wanted(host), "holds")
@@ -122,19 +122,19 @@ def test_a_drive_that_comes_back_gives_its_goal_again(host: RunningHost) -> None
 
 
 def test_words_wait_for_the_payload_that_knows_them(host: RunningHost) -> None:
-    host.plug(errand(host, "shine"))
-    host.until_step(call_name(host), "active")
+    host.plug(delivery(host, "shine"))
+    host.until_step(delivery_name(host), "active")
     shown = until_shown(host, "needs-help", "PHRASE_UNKNOWN")
-    assert shown["payload"] == call_id(host)
+    assert shown["payload"] == delivery_id(host)
     beacon(host)
     host.until_goal(wanted(host), "holds")
 
 
 def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> None:
-    name = host.plug(errand(host, "shine"))
+    name = host.plug(delivery(host, "shine"))
     until_shown(host, "needs-help", "PHRASE_UNKNOWN")
     host.pull(name)
-    host.until_gone(call_name(host))
+    host.until_gone(delivery_name(host))
     beacon(host)
     until_shown(host, "ready")
     assert not host.goals()
@@ -142,38 +142,38 @@ def test_words_that_wait_are_forgotten_with_their_drive(host: RunningHost) -> No
 
 def test_each_line_is_a_goal(host: RunningHost) -> None:
     beacon(host)
-    host.plug(errand(host, "blink", "shine"))
+    host.plug(delivery(host, "blink", "shine"))
     host.until_goal(wanted(host, 2), "holds")
     host.until_goal(wanted(host), "reached")
 
 
 def test_a_role_that_may_not_give_goals_is_refused_with_its_payload(tmp_path: Path) -> None:
     with trusting(tmp_path, ["network"]) as host:
-        host.plug(errand(host, "shine"))
+        host.plug(delivery(host, "shine"))
         shown = until_shown(host, "refused", "PERMISSION_DENIED")
         assert "'goals'" in shown["sentence"]
         assert not host.goals()
 
 
-def test_a_goal_that_nobody_signed_is_refused_unread(host: RunningHost) -> None:
-    host.plug(errand(host, "shine", signer=None))
+def test_a_goal_without_a_signature_is_refused_unread(host: RunningHost) -> None:
+    host.plug(delivery(host, "shine", signer=None))
     until_shown(host, "refused", "SIG_MISSING")
     assert not host.goals()
 
 
 def test_a_goal_that_was_changed_after_it_was_signed_is_refused(host: RunningHost) -> None:
-    drive = errand(host, "shine")
-    (drive / "nondum" / call_id(host) / goals.NAME).write_text("smash\n")
+    drive = delivery(host, "shine")
+    (drive / "nondum" / delivery_id(host) / goals.NAME).write_text("smash\n")
     host.plug(drive)
     until_shown(host, "refused", "HASH_MISMATCH")
 
 
 def test_a_goal_file_that_is_none_is_refused_though_it_is_signed(host: RunningHost) -> None:
-    drive = errand(host, "shine")
-    folder = drive / "nondum" / call_id(host)
+    drive = delivery(host, "shine")
+    folder = drive / "nondum" / delivery_id(host)
     (folder / goals.NAME).write_text("\n# nothing\n")
     (folder / "CONTENTS.sig").unlink()
-    seal(folder, payload_id=call_id(host))
+    seal(folder, payload_id=delivery_id(host))
     sign_payload(folder, ALICE)
     host.plug(drive)
     until_shown(host, "refused", "GOAL_FILE")
@@ -193,7 +193,7 @@ def test_a_goal_beside_the_payloads_is_told_of_and_never_wanted(host: RunningHos
 def test_a_daemon_that_starts_again_gives_the_goal_once(tmp_path: Path) -> None:
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
-        host.plug(errand(host, "shine"))
+        host.plug(delivery(host, "shine"))
         host.until_goal(wanted(host), "holds")
         host.kill()
         host.start()
@@ -201,15 +201,15 @@ def test_a_daemon_that_starts_again_gives_the_goal_once(tmp_path: Path) -> None:
         assert [row["id"] for row in host.goals()] == [wanted(host)]
 
 
-def test_a_goal_whose_drive_was_pulled_meanwhile_is_not_taken_up(tmp_path: Path) -> None:
+def test_a_goal_is_not_taken_up_after_its_drive_was_pulled(tmp_path: Path) -> None:
     with trusting(tmp_path, ["goals"]) as host:
         beacon(host)
-        name = host.plug(errand(host, "shine"))
+        name = host.plug(delivery(host, "shine"))
         host.until_goal(wanted(host), "holds")
         host.kill()
         host.pull(name)
         host.start()
         host.until_step("beacon", "active")
-        host.until_gone(call_name(host))
+        host.until_gone(delivery_name(host))
         until_shown(host, "ready")
         assert not host.goals()

@@ -51,7 +51,7 @@ def refused(one: Guest, method: str, **args: Any) -> str:
 
 
 def many_users(part: Part, users: int) -> Part:
-    """The same lamp for so many at once, whoever has it."""
+    """The same lamp, for `users` users at once."""
     source = part.source.replace("users=1", f"users={users}").replace("(not (idle ?u))", "")
     return replace(part, source=source.replace("(idle ?u)", ""))
 
@@ -75,7 +75,7 @@ def test_unit_serves_as_many_as_its_author_says(mule: OpenHost, tmp_path: Path) 
         assert refused(one, "behave", **shine()) == "UNIT_TAKEN"
 
 
-def test_unit_that_serves_one_is_taken_for_others(mule: OpenHost, tmp_path: Path) -> None:
+def test_unit_that_serves_one_refuses_a_second_user(mule: OpenHost, tmp_path: Path) -> None:
     host, address = mule
     host.bring("light", beacon(tmp_path / "log"))
     with guest("guest", ("mule", address)) as one, guest("other", ("mule", address)) as other:
@@ -113,7 +113,7 @@ def test_host_that_asks_again_has_lost_what_it_asked_for_before(
 @pytest.mark.parametrize(
     ("asked", "code"),
     [
-        (shine(component="nobody"), "NOT_OFFERED"),
+        (shine(component="missing"), "NOT_OFFERED"),
         (shine(behaviour="burn"), "NOT_OFFERED"),
         (shine(arguments={"u": "mule__other__lamp", "h": "guest"}), "NOT_OFFERED"),
         (shine(arguments={"u": LAMP}), "CALL_MALFORMED"),

@@ -31,7 +31,7 @@ class Stranger:
 
 @pytest.fixture(scope="module")
 def strangers(tmp_path_factory: pytest.TempPathFactory, seed: int) -> list[Stranger]:
-    """Two talkers and two listeners under names that nobody has read before."""
+    """Two talkers and two listeners under random names."""
     folder, words = tmp_path_factory.mktemp("invented"), Words(seed)
     options = Options(targets=(Target.here(),), libraries=(SDK,))
     made = []
@@ -75,39 +75,39 @@ def reach(robot: Robot, **goal: str) -> list[str]:
     return list(seen)
 
 
-def heard(robot: Robot, ear: Stranger, mouth: Stranger) -> str | None:
-    """What a listener says that it heard on a talker's stream."""
+def received(robot: Robot, receiver: Stranger, sender: Stranger) -> str | None:
+    """What a listener says that it received on a talker's stream."""
     rows = {row["fact"]: row for row in robot.ask("facts")}
-    row = rows.get(fact(robot, ear, mouth))
+    row = rows.get(fact(robot, receiver, sender))
     return None if row is None else str(row["value"][1]["text"])
 
 
-def fact(robot: Robot, ear: Stranger, mouth: Stranger) -> str:
+def fact(robot: Robot, receiver: Stranger, sender: Stranger) -> str:
     """That a listener heard a talker's stream."""
-    unit = ear.plugin.object(robot.name, "unit")
-    return f"{ear.plugin['heard']} {unit} {mouth.plugin.object(robot.name, 'slot')}"
+    unit = receiver.plugin.object(robot.name, "unit")
+    return f"{receiver.plugin['heard']} {unit} {sender.plugin.object(robot.name, 'slot')}"
 
 
 def test_a_sentence_is_carried_out_by_strangers(
     robot: Robot, strangers: list[Stranger], seed: int
 ) -> None:
-    mouth, ear = strangers[0], strangers[2]
-    plug(robot, seed, mouth, ear)
-    reach(robot, words=sentence(ear.plugin))
-    assert heard(robot, ear, mouth) == mouth.plugin["says"]
-    done = f"{ear.plugin['done']} {ear.plugin['thing']} {robot.name}"
+    sender, receiver = strangers[0], strangers[2]
+    plug(robot, seed, sender, receiver)
+    reach(robot, words=sentence(receiver.plugin))
+    assert received(robot, receiver, sender) == sender.plugin["says"]
+    done = f"{receiver.plugin['done']} {receiver.plugin['thing']} {robot.name}"
     assert done in {row["fact"] for row in robot.ask("facts")}
 
 
 def test_swapping_two_objects_in_the_plan_swaps_the_feed(
     robot: Robot, strangers: list[Stranger], seed: int
 ) -> None:
-    mouths, ears = strangers[:2], strangers[2:]
+    senders, receivers = strangers[:2], strangers[2:]
     plug(robot, seed, *strangers)
-    for order in (mouths, mouths[::-1]):
-        pairs = list(zip(ears, order, strict=True))
-        facts = " ".join(f"({fact(robot, ear, mouth)})" for ear, mouth in pairs)
-        assert not any(heard(robot, ear, mouth) for ear, mouth in pairs)
+    for order in (senders, senders[::-1]):
+        pairs = list(zip(receivers, order, strict=True))
+        facts = " ".join(f"({fact(robot, receiver, sender)})" for receiver, sender in pairs)
+        assert not any(received(robot, receiver, sender) for receiver, sender in pairs)
         reach(robot, pddl=f"(and {facts})")
-        for ear, mouth in pairs:
-            assert heard(robot, ear, mouth) == mouth.plugin["says"]
+        for receiver, sender in pairs:
+            assert received(robot, receiver, sender) == sender.plugin["says"]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.daemon.neighbours import BEACON, UNCONFINED, ear, say
+from tests.daemon.neighbours import BEACON, UNCONFINED, listener, say
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost, running
 
@@ -32,9 +32,9 @@ class Slow:
     """A payload that is being installed until it is let."""
 
     def __init__(self, host: RunningHost) -> None:
-        """The host has ears, too: see `says`."""
+        """The host has a listener, too: see `says`."""
         self._said = host.work / "said"
-        host.bring("ears", ear(self._said))
+        host.bring("microphone", listener(self._said))
         self.host, self._let = host, host.work / "let"
         source = SLOW.replace("LOG", str(host.work / "log")).replace("LET", str(self._let))
         host.plug(host.drive("slow", Part("beacon", source)))
@@ -77,7 +77,7 @@ def test_words_that_are_kept_are_given_once_they_mean_something(slow: Slow) -> N
     assert (reached["goal"], reached["priority"]) == ("(seen spot)", 3)
 
 
-def test_whoever_waits_is_told_how_it_ends(slow: Slow) -> None:
+def test_goal_command_that_waits_tells_how_the_goal_ends(slow: Slow) -> None:
     with slow.host.started("goal", "blink", "--wait", "--json") as waiting:
         slow.host.until("the words are kept", lambda view: any(view["goals"]), timeout_s=READY_S)
         slow.let()
@@ -104,7 +104,7 @@ def test_words_are_given_up_when_what_they_wait_for_does_not_come(slow: Slow) ->
     assert (waiting.returncode, row["state"]) == (1, "halted")
 
 
-def test_words_that_are_heard_too_early_are_kept_while_payloads_come_in(slow: Slow) -> None:
+def test_words_spoken_too_early_are_kept_while_payloads_come_in(slow: Slow) -> None:
     slow.says("blink")
     told = slow.host.until_told("'blink': that is kept as goal ")
     assert "1 payload is still being installed" in told
@@ -114,7 +114,7 @@ def test_words_that_are_heard_too_early_are_kept_while_payloads_come_in(slow: Sl
     slow.host.until_told("'dance': PHRASE_UNKNOWN")
 
 
-def test_whoever_stops_the_robot_ends_what_is_kept(slow: Slow) -> None:
+def test_stop_ends_kept_goals(slow: Slow) -> None:
     kept = slow.host.ask("goal", words="blink", keep=True)["id"]
     assert kept in slow.host.ask("goal", words="stop")["stopped"]["goals"]
     slow.let()

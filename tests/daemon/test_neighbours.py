@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.daemon.neighbours import beacon, ear, neighbours, routed, say, until_shared, written
+from tests.daemon.neighbours import beacon, listener, neighbours, routed, say, until_shared, written
 from tests.daemon.plugins import scribe, talker
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost
@@ -65,8 +65,8 @@ def shining(log: Path) -> Part:
     return replace(part, source=source)
 
 
-def until_standing(host: RunningHost, goal: str, state: str) -> None:
-    """Wait until a goal that was given to a peer is known to be there."""
+def until_elsewhere(host: RunningHost, goal: str, state: str) -> None:
+    """Wait until a host knows the state of a goal that it gave to a peer."""
 
     def known() -> dict[str, str]:
         return {row["id"]: row["state"] for row in host.ask("goals")["elsewhere"]}
@@ -233,10 +233,10 @@ def test_camera_of_another_body_is_not_planned_with(trio: Hosts) -> None:
     rover.until_goal(rover.want("(written rover)"), "holds")
 
 
-def test_stop_that_is_heard_stops_every_host(pair: Hosts, tmp_path: Path) -> None:
+def test_spoken_stop_stops_every_host(pair: Hosts, tmp_path: Path) -> None:
     said = tmp_path / "said"
     rover, mule = pair
-    mule.bring("ears", ear(said))
+    mule.bring("microphone", listener(said))
     rover.bring("talk", talker("talker"))
     rover.bring("write", scribe())
     until_shared(mule, "scribe@rover")
@@ -258,10 +258,10 @@ def test_stop_that_is_heard_stops_every_host(pair: Hosts, tmp_path: Path) -> Non
     rover.until_goal(third, "halted")
 
 
-def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_path: Path) -> None:
+def test_spoken_goal_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_path: Path) -> None:
     said, log = tmp_path / "said", tmp_path / "log"
     rover, mule = pair
-    mule.bring("ears", ear(said))
+    mule.bring("microphone", listener(said))
     rover.bring("light", beacon(log, type="pointer"))
     until_shared(mule, "beacon@rover")
     say(said, "rover, blink")
@@ -276,7 +276,7 @@ def test_goal_that_is_heard_goes_to_the_peer_that_can_have_it(pair: Hosts, tmp_p
     assert mule.run("say", "mule, what are you doing").ok().out.startswith("I do nothing")
 
 
-def test_goal_that_is_typed_goes_where_one_that_is_heard_would(pair: Hosts, tmp_path: Path) -> None:
+def test_typed_goal_goes_where_a_spoken_one_would(pair: Hosts, tmp_path: Path) -> None:
     rover, mule = pair
     rover.bring("light", beacon(tmp_path / "log", type="pointer"))
     until_shared(mule, "beacon@rover")
@@ -302,12 +302,10 @@ def test_question_that_names_a_host_is_answered_by_it(pair: Hosts, tmp_path: Pat
     assert "(lit rover)" in mule.ask("say", words="rover, what are you doing")["answer"]
 
 
-def test_question_that_is_heard_is_answered_by_the_host_that_it_names(
-    pair: Hosts, tmp_path: Path
-) -> None:
+def test_spoken_question_is_answered_by_the_host_that_it_names(pair: Hosts, tmp_path: Path) -> None:
     said = tmp_path / "said"
     rover, mule = pair
-    mule.bring("ears", ear(said))
+    mule.bring("microphone", listener(said))
     rover.bring("light", beacon(tmp_path / "log", type="pointer"))
     until_shared(mule, "beacon@rover")
     say(said, "rover, what can you do?")
@@ -362,11 +360,11 @@ def test_goal_of_a_host_that_is_back_is_told_of_again(end: str, tmp_path: Path) 
         stopped = rover.pid
         rover.kill() if end == "kill" else os.kill(stopped, signal.SIGSTOP)
         mule.until_told("the host rover is gone")
-        until_standing(mule, given["id"], "unknown")
+        until_elsewhere(mule, given["id"], "unknown")
         rover.start() if end == "kill" else os.kill(stopped, signal.SIGCONT)
-        until_standing(mule, given["id"], "active")
+        until_elsewhere(mule, given["id"], "active")
         rover.ask("halt", id=given["id"])
-        until_standing(mule, given["id"], "halted")
+        until_elsewhere(mule, given["id"], "halted")
 
 
 def test_words_that_are_kept_go_to_the_host_that_comes_back(tmp_path: Path) -> None:
@@ -386,4 +384,4 @@ def test_words_that_are_kept_go_to_the_host_that_comes_back(tmp_path: Path) -> N
         given = mule.ask("goals")["elsewhere"]
         assert [(row["host"], row["text"]) for row in given] == [("rover", "blink")] * 2
         for row in given:
-            until_standing(mule, row["id"], "reached")
+            until_elsewhere(mule, row["id"], "reached")

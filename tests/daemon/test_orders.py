@@ -57,7 +57,7 @@ def test_actuator_has_one_user_at_a_time(host: RunningHost) -> None:
     assert actors == {"spot__left__arm", "spot__right__arm"}
 
 
-def test_actuator_whose_plugin_does_not_ask_has_one_user_at_a_time(host: RunningHost) -> None:
+def test_actuator_has_one_user_at_a_time_though_its_plugin_does_not_ask(host: RunningHost) -> None:
     host.bring("arm", arm(is_rude=True))
     host.until_goal(host.want("(raised spot)"), "holds")
     host.until_goal(host.want(BOTH), "suspended")

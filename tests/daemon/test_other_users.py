@@ -15,7 +15,7 @@ from nondum.host.sandbox.levels.users import is_workers
 pytestmark = pytest.mark.daemon
 
 
-def test_nothing_that_a_host_keeps_is_open_to_others(own_host: RunningHost) -> None:
+def test_other_users_can_open_nothing_that_a_host_keeps(own_host: RunningHost) -> None:
     own_host.bring("talker", talker())
     own_host.until_component("talker", "ready")
     root = own_host.state

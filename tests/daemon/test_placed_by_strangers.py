@@ -1,4 +1,4 @@
-"""What a host takes from a peer that hands it payloads, and what it refuses, whatever is sent."""
+"""What a host accepts and refuses from a peer that places payloads on it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ Twist = Callable[[str, int, bytes], Any]
 """Path of a file, offset and its bytes there → what is sent."""
 
 
-class Hands:
-    """Hands out the files of one payload folder, not always as they are."""
+class FileServer:
+    """Serves the files of one payload folder, changed by `twist`."""
 
     def __init__(self, folder: Path, twist: Twist = lambda path, offset, data: data) -> None:
         self.folder, self._twist = folder, twist
@@ -45,16 +45,16 @@ class Hands:
             "why": "it likes it better there",
         } | more
 
-    def serve(self, errand: IncomingCall) -> Body:
-        if errand.method == "place.want":
+    def serve(self, incoming: IncomingCall) -> Body:
+        if incoming.method == "place.want":
             return {}
-        path, offset = self._files[errand.args["sha256"]], errand.args["offset"]
-        data = path.read_bytes()[offset : offset + errand.args["length"]]
+        path, offset = self._files[incoming.args["sha256"]], incoming.args["offset"]
+        data = path.read_bytes()[offset : offset + incoming.args["length"]]
         return {"data": self._twist(path.relative_to(self.folder).as_posix(), offset, data)}
 
     def notice(self, *_: Any) -> None: ...
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
 
@@ -93,10 +93,10 @@ def wheels(host: RunningHost) -> set[str]:
     return {path.name for path in (host.state / "store").glob("[0-9a-f]*")}
 
 
-def refused(one: Guest, hands: Hands, **more: Any) -> tuple[str, str]:
+def refused(one: Guest, server: FileServer, **more: Any) -> tuple[str, str]:
     """Code and place of a refusal."""
     with pytest.raises(CallFailed) as caught:
-        one.ask("mule", "place.take", **hands.offer(**more))
+        one.ask("mule", "place.take", **server.offer(**more))
     return caught.value.code, caught.value.problems[0].where
 
 
@@ -134,9 +134,9 @@ def test_file_that_is_not_as_listed_is_refused(
 ) -> None:
     host, address = mule
     where, change = TWISTS[twist]
-    hands = Hands(folder, change)
-    with guest("liar", ("mule", address), handler=hands) as one:
-        code, place = refused(one, hands)
+    server = FileServer(folder, change)
+    with guest("liar", ("mule", address), handler=server) as one:
+        code, place = refused(one, server)
         assert code == "HASH_MISMATCH"
         assert place.startswith(where)
     check_nothing_is_left(host, stored)
@@ -161,17 +161,17 @@ def test_offer_that_is_none_is_refused(
     mule: OpenHost, folder: Path, stored: set[str], args: dict[str, Any]
 ) -> None:
     host, address = mule
-    hands = Hands(folder)
-    with guest("liar", ("mule", address), handler=hands) as one:
-        assert refused(one, hands, **args)[0] == "CALL_MALFORMED"
+    server = FileServer(folder)
+    with guest("liar", ("mule", address), handler=server) as one:
+        assert refused(one, server, **args)[0] == "CALL_MALFORMED"
     check_nothing_is_left(host, stored)
 
 
 def test_payload_of_another_name_is_refused(mule: OpenHost, folder: Path, stored: set[str]) -> None:
     host, address = mule
-    hands = Hands(folder)
-    with guest("liar", ("mule", address), handler=hands) as one:
-        assert refused(one, hands, payload="org.example.dark")[0] == "CALL_MALFORMED"
+    server = FileServer(folder)
+    with guest("liar", ("mule", address), handler=server) as one:
+        assert refused(one, server, payload="org.example.dark")[0] == "CALL_MALFORMED"
     check_nothing_is_left(host, stored)
 
 
@@ -182,9 +182,9 @@ def test_list_that_leads_out_of_the_folder_is_refused(
     listed = (folder / "CONTENTS").read_text(encoding="ascii")
     hostile = listed.replace("payload.toml", "../../../../payload.toml")
     (folder / "CONTENTS").write_text(hostile, encoding="ascii")
-    hands = Hands(folder)
-    with guest("liar", ("mule", address), handler=hands) as one:
-        code, _ = refused(one, hands)
+    server = FileServer(folder)
+    with guest("liar", ("mule", address), handler=server) as one:
+        code, _ = refused(one, server)
         assert code in ("PATH_UNSAFE", "CONTENTS_ENTRY")
     check_nothing_is_left(host, stored)
 
@@ -196,17 +196,17 @@ def test_more_to_judge_than_is_read_is_refused(
     with (folder / "leaflet.txt").open("wb") as leaflet:
         leaflet.truncate(17 << 20)
     seal(folder, payload_id=folder.name)
-    hands = Hands(folder)
-    with guest("liar", ("mule", address), handler=hands) as one:
-        assert refused(one, hands)[0] == "TOO_LARGE"
+    server = FileServer(folder)
+    with guest("liar", ("mule", address), handler=server) as one:
+        assert refused(one, server)[0] == "TOO_LARGE"
     check_nothing_is_left(host, stored)
 
 
 def test_sound_payload_is_here_for_as_long_as_the_call(mule: OpenHost, folder: Path) -> None:
     host, address = mule
-    hands = Hands(folder)
-    with guest("rover", ("mule", address), handler=hands) as one:
-        steps = one.reports("mule", "place.take", until={"step": "active"}, **hands.offer())
+    server = FileServer(folder)
+    with guest("rover", ("mule", address), handler=server) as one:
+        steps = one.reports("mule", "place.take", until={"step": "active"}, **server.offer())
         assert steps[0]["step"] == "checking"
         host.until_component("beacon", "ready")
         (row,) = host.ask("places")
@@ -224,9 +224,9 @@ def test_older_release_than_was_here_is_refused(mule: OpenHost, folder: Path, re
     host.pull(slot)
     host.until_gone("light")
     seal(folder, payload_id=folder.name, release=release - 1)
-    hands = Hands(folder)
-    with guest("rover", ("mule", address), handler=hands) as one:
-        assert refused(one, hands)[0] == "ROLLBACK"
+    server = FileServer(folder)
+    with guest("rover", ("mule", address), handler=server) as one:
+        assert refused(one, server)[0] == "ROLLBACK"
 
 
 def test_component_of_the_id_of_one_that_is_here_is_taken_beside_it(
@@ -234,9 +234,9 @@ def test_component_of_the_id_of_one_that_is_here_is_taken_beside_it(
 ) -> None:
     host, address = mule
     host.bring("lamp", beacon(tmp_path / "log"))
-    hands = Hands(folder)
-    with guest("rover", ("mule", address), handler=hands) as one:
-        one.reports("mule", "place.take", until={"step": "active"}, **hands.offer())
+    server = FileServer(folder)
+    with guest("rover", ("mule", address), handler=server) as one:
+        one.reports("mule", "place.take", until={"step": "active"}, **server.offer())
         host.until_component("beacon--org-example-light", "ready")
         assert host.component("beacon") is not None
     host.until_gone("light")
@@ -246,9 +246,9 @@ def test_only_who_takes_a_payload_may_fetch_it(mule: OpenHost, folder: Path) -> 
     host, address = mule
     host.plug(folder.parents[1])
     host.until_step("light", "active")
-    hands = Hands(folder)
-    digest = hands.offer()["digest"]
-    with guest("thief", ("mule", address), handler=hands) as one:
+    server = FileServer(folder)
+    digest = server.offer()["digest"]
+    with guest("thief", ("mule", address), handler=server) as one:
         for method, args in (
             ("place.read", {"sha256": digest, "offset": 0, "length": 9}),
             ("place.want", {"wanted": [digest]}),

@@ -29,7 +29,7 @@ DOMAIN = """
 
 @hookimpl
 def units():
-    return [Unit("wall", "sensor", outputs=(Output("again", "text"),))]
+    return [Unit("cliff", "sensor", outputs=(Output("again", "text"),))]
 
 @hookimpl
 def fragments():

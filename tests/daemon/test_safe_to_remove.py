@@ -32,7 +32,7 @@ def written(drive: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in drive.rglob("*")}
 
 
-def test_whoever_pulls_when_told_loses_nothing(tmp_path: Path) -> None:
+def test_pull_after_it_is_safe_loses_nothing(tmp_path: Path) -> None:
     with running(tmp_path, more=UNCONFINED + FEEDBACK) as host:
         drive = host.drive(NAME, beacon(tmp_path))
         before = written(drive)
@@ -54,7 +54,7 @@ def test_whoever_pulls_when_told_loses_nothing(tmp_path: Path) -> None:
         assert [row["bytes_copied"] > 0 for row in copied] == [True, False]
 
 
-def test_nothing_is_told_before_the_payload_is_in_force(tmp_path: Path) -> None:
+def test_nothing_is_told_before_the_payload_is_active(tmp_path: Path) -> None:
     with running(tmp_path, more=UNCONFINED + FEEDBACK) as host:
         host.bring(NAME, beacon(tmp_path))
         until_safe(host)
@@ -64,7 +64,7 @@ def test_nothing_is_told_before_the_payload_is_in_force(tmp_path: Path) -> None:
         assert any(told == "working" for told, _ in states)
 
 
-def test_whoever_pulls_before_is_never_told_that_it_was_safe(tmp_path: Path) -> None:
+def test_pull_before_it_is_safe_is_never_told_as_safe(tmp_path: Path) -> None:
     with running(tmp_path, more=UNCONFINED + FEEDBACK) as host:
         name = host.plug(host.drive(NAME, beacon(tmp_path)))
         host.until("working", lambda v: shown(v) == "working", timeout_s=READY_S)

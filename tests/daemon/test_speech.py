@@ -68,14 +68,14 @@ def test_spoken_goal_is_reached_and_told_aloud(
 
     said = Vocabulary(("speech heard greet people that is goal one", "speech is active"))
     words = lexicon(said.words, lambda word, voice: espeak.phonemes(word, voice=voice))
-    ears = Recogniser(said, words, FreeHearing(), Limits(-0.85, -0.85))
+    recogniser = Recogniser(said, words, FreeHearing(), Limits(-0.85, -0.85))
 
     heard: dict[Path, bool] = {}
 
     def repeated(_view: object) -> bool:
         for file in {*(scratch / "out").glob("*.wav")} - said_before - {*heard}:
             sentences = sentences_of(read_wav(file))  # hearing takes longer than saying
-            heard[file] = any(ears.hear(one).said == said.phrases[0] for one in sentences)
+            heard[file] = any(recogniser.hear(one).said == said.phrases[0] for one in sentences)
         return any(heard.values())
 
     host.until("the answer was said", repeated, timeout_s=READY_S)

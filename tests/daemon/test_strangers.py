@@ -81,7 +81,7 @@ def test_hosts_that_were_never_introduced_stay_apart(tmp_path: Path) -> None:
             assert not is_peer(host, other)
 
 
-def test_host_whose_port_is_taken_listens_at_another_and_says_so(tmp_path: Path) -> None:
+def test_host_listens_at_another_port_when_its_own_is_taken_and_says_so(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with open_host(tmp_path / "rover", "rover", port) as (rover, _):
@@ -106,7 +106,7 @@ def test_paired_hosts_are_peers_until_one_is_revoked(tmp_path: Path) -> None:
         assert not is_peer(rover, "mule")
 
 
-def test_fleet_lets_hosts_in_whose_certificates_a_drive_brings(tmp_path: Path) -> None:
+def test_fleet_lets_hosts_in_with_certificates_from_a_drive(tmp_path: Path) -> None:
     fleet, drive = tmp_path / "fleet", tmp_path / "drive"
     subprocess.run([*NONDUM, "keys", "fleet", "new", fleet], check=True, capture_output=True)
     with strangers(tmp_path) as (rover, mule):

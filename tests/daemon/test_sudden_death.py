@@ -55,7 +55,7 @@ def test_nothing_temporary_is_left_of_a_daemon_that_was_killed(own_host: Running
     assert not (host.state / "probes/nondum-probe-1").exists()
 
 
-def test_killed_worker_is_started_again_and_others_never_notice(host: RunningHost) -> None:
+def test_killed_worker_is_started_again_and_all_else_goes_on(host: RunningHost) -> None:
     host.bring("write", scribe())
     host.bring("talk", talker())
     goal = host.want("(written spot)")
@@ -105,5 +105,5 @@ def without_pids(host: RunningHost) -> list[Row]:
 
 
 def places(traces: Traces) -> tuple[object, ...]:
-    """What lies where, and runs for whom; rows keep times and counts."""
+    """Files and processes of a host; its rows are left out, for they hold times and counts."""
     return traces.workers, traces.opened, traces.mounts, traces.folders

@@ -1,4 +1,4 @@
-"""Plugins that nobody wrote: whole packages of random words, made when a test runs.
+"""Plugins that a test generates: whole packages of random words.
 
 A talker produces a stream of text, lasting; a listener waits for one message of such a stream and
 keeps what it said as the value of a fact, finishing. They share nothing but the core's words.
@@ -159,7 +159,7 @@ class Invented:
 
 
 def talker(folder: Path, words: Words) -> Invented:
-    """Write a plugin that says a word of its own, `says`, on its output `slot`."""
+    """Write a plugin that says a random word, `says`, on its output `slot`."""
     return _written(folder, words, _TALKER, TALKER_PLUGIN, TALKER_DOMAIN)
 
 

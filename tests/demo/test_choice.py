@@ -1,4 +1,4 @@
-"""Who was chosen over whom, read off a tree."""
+"""Which component was chosen instead of which others, read off a tree."""
 
 from __future__ import annotations
 

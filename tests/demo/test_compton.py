@@ -37,7 +37,7 @@ def localised(scenario: Scenario, *, within_s: float = 60.0) -> tuple[Observatio
     return observation, within_s
 
 
-def heard(camera: ComptonCamera, seconds: float) -> bytes:
+def received(camera: ComptonCamera, seconds: float) -> bytes:
     return b"".join(camera.advance(TICK_S) for _ in range(round(seconds / TICK_S)))
 
 
@@ -74,20 +74,20 @@ def test_the_driver_finds_it_after_a_start_in_mid_stream() -> None:
     scenario = random_scenario(3)
     camera = ComptonCamera(scenario)
     decoder = Decoder()
-    records = decoder.feed(heard(camera, 2.0)[17:])
+    records = decoder.feed(received(camera, 2.0)[17:])
     assert len(records) > 300
     assert decoder.discarded == 34 - 17
 
 
 def test_status_comes_every_second() -> None:
-    records = Decoder().feed(heard(ComptonCamera(random_scenario(4)), 5.05))
+    records = Decoder().feed(received(ComptonCamera(random_scenario(4)), 5.05))
     said = [record for record in records if isinstance(record, Status)]
     assert [round(status.live_ms / 1000) for status in said] == [1, 2, 3, 4, 5]
 
 
 def test_a_line_too_slow_loses_events_and_says_so() -> None:
     near = replace(random_scenario(5), activity_bq=1e11)
-    sent = heard(ComptonCamera(near), 1.5)
+    sent = received(ComptonCamera(near), 1.5)
     assert len(sent) <= compton.BYTES_PER_S * 1.5
     records = Decoder().feed(sent)
     numbers = [record.sequence for record in records if isinstance(record, Event)]
@@ -97,14 +97,14 @@ def test_a_line_too_slow_loses_events_and_says_so() -> None:
 
 
 def test_twice_the_distance_is_a_quarter_of_the_flux() -> None:
-    air = np.exp(compton.AIR_PER_M * 10)
+    attenuation = np.exp(compton.AIR_PER_M * 10)
     near, far = compton.straight_hz(1e9, 10_000), compton.straight_hz(1e9, 20_000)
-    assert near / far == pytest.approx(4 * air)
+    assert near / far == pytest.approx(4 * attenuation)
 
 
 def test_the_same_seed_is_the_same_run() -> None:
     one, other = (ComptonCamera(random_scenario(6)) for _ in range(2))
-    assert heard(one, 0.5) == heard(other, 0.5)
+    assert received(one, 0.5) == received(other, 0.5)
 
 
 def test_the_document_holds_the_examples_it_shows() -> None:

@@ -28,7 +28,7 @@ from nondum.wheelhouse.format.target import Target
 
 ROOT = Path(__file__).parents[2]
 HOST = "rover"
-ROOMS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
+FOLDERS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
 
 
 @pytest.fixture
@@ -68,8 +68,8 @@ def plan(strangers: list[Invented], goal: str, *, is_words: bool = False) -> lis
 def test_no_name_occurs_in_nondum(strangers: list[Invented]) -> None:
     sources = [
         path
-        for room in ROOMS
-        for path in (ROOT / room).rglob("*")
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*")
         if path.suffix in {".py", ".pddl", ".lark", ".sql", ".toml", ".md"}
     ]
     assert len(sources) > 100
@@ -92,7 +92,7 @@ def test_a_talker_talks(strangers: list[Invented], worker: WorkerFactory) -> Non
     assert call.halt().state == "halted"
 
 
-def test_a_listener_keeps_what_it_heard(strangers: list[Invented], worker: WorkerFactory) -> None:
+def test_a_listener_keeps_the_message(strangers: list[Invented], worker: WorkerFactory) -> None:
     last = strangers[-1]
     bench = worker(last.entry_point)
     arguments = {last["actor"]: last["unit"], last["stream"]: "wire"}
@@ -105,31 +105,31 @@ def test_a_listener_keeps_what_it_heard(strangers: list[Invented], worker: Worke
 
 
 def test_a_sentence_needs_both_strangers(strangers: list[Invented]) -> None:
-    mouth, ear = strangers[1], strangers[2]
-    stream = mouth.object(HOST, "slot")
-    assert plan([mouth, ear], sentence(ear), is_words=True) == [
-        f"{mouth.schema} {mouth.object(HOST, 'unit')} {stream} {HOST}",
-        f"{ear.schema} {ear.object(HOST, 'unit')} {stream} {ear['thing']} {HOST}",
+    sender, receiver = strangers[1], strangers[2]
+    stream = sender.object(HOST, "slot")
+    assert plan([sender, receiver], sentence(receiver), is_words=True) == [
+        f"{sender.schema} {sender.object(HOST, 'unit')} {stream} {HOST}",
+        f"{receiver.schema} {receiver.object(HOST, 'unit')} {stream} {receiver['thing']} {HOST}",
     ]
-    assert plan([ear], sentence(ear), is_words=True) is None
+    assert plan([receiver], sentence(receiver), is_words=True) is None
 
 
-def test_a_goal_says_who_listens_to_whom(strangers: list[Invented]) -> None:
-    mouths, ears = strangers[:2], strangers[2:]
+def test_a_goal_says_which_listener_reads_which_talker(strangers: list[Invented]) -> None:
+    senders, receivers = strangers[:2], strangers[2:]
 
     def wires(*pairs: tuple[Invented, Invented]) -> set[tuple[str, str]]:
         goal = " ".join(
-            f"({ear['heard']} {ear.object(HOST, 'unit')} {mouth.object(HOST, 'slot')})"
-            for ear, mouth in pairs
+            f"({receiver['heard']} {receiver.object(HOST, 'unit')} {sender.object(HOST, 'slot')})"
+            for receiver, sender in pairs
         )
         steps = plan(strangers, f"(and {goal})") or []
         split = [step.split() for step in steps]
-        return {(s[1], s[2]) for s in split if s[0] in {ear.schema for ear in ears}}
+        return {(s[1], s[2]) for s in split if s[0] in {receiver.schema for receiver in receivers}}
 
-    straight = wires((ears[0], mouths[0]), (ears[1], mouths[1]))
-    swapped = wires((ears[0], mouths[1]), (ears[1], mouths[0]))
-    units = [ear.object(HOST, "unit") for ear in ears]
-    slots = [mouth.object(HOST, "slot") for mouth in mouths]
+    straight = wires((receivers[0], senders[0]), (receivers[1], senders[1]))
+    swapped = wires((receivers[0], senders[1]), (receivers[1], senders[0]))
+    units = [receiver.object(HOST, "unit") for receiver in receivers]
+    slots = [sender.object(HOST, "slot") for sender in senders]
     assert straight == {(units[0], slots[0]), (units[1], slots[1])}
     assert swapped == {(units[0], slots[1]), (units[1], slots[0])}
 
@@ -137,10 +137,10 @@ def test_a_goal_says_who_listens_to_whom(strangers: list[Invented]) -> None:
 @pytest.mark.slow
 def test_a_payload_is_built(strangers: list[Invented], tmp_path: Path) -> None:
     options = Options(targets=(Target.here(),), libraries=(ROOT / "plugins/sdk",))
-    mouth = strangers[0]
-    folder = build(mouth.folder, tmp_path / "drive", options, lambda *_: None)
-    assert folder == tmp_path / "drive/nondum" / mouth.payload_id
+    sender = strangers[0]
+    folder = build(sender.folder, tmp_path / "drive", options, lambda *_: None)
+    assert folder == tmp_path / "drive/nondum" / sender.payload_id
     assert not verify(folder, UnsignedAllowed()).problems
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
-    said = describe(load(mouth.entry_point, mouth["distribution"])).to_dict()
-    assert index["components"][mouth["component"]] == said | {"version": "1.0"}
+    said = describe(load(sender.entry_point, sender["distribution"])).to_dict()
+    assert index["components"][sender["component"]] == said | {"version": "1.0"}

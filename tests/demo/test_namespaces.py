@@ -151,14 +151,14 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next() -> None:
     with subprocess.Popen(words, cwd=ROOT, stdin=pipe, stdout=pipe) as killed:
         assert killed.stdout is not None
         killed.stdout.readline()
-        # While it lives: once it is dead, whoever makes a network next removes them.
+        # While it lives: once it is dead, the next process that makes a network removes them.
         assert len([name for name in left() if f"-{killed.pid}-" in name]) == 3
         killed.kill()
     with Network():
         assert not [name for name in left() if f"-{killed.pid}-" in name]
 
 
-def test_program_that_stands_for_a_machine_hears_the_others(network: Network) -> None:
+def test_program_that_stands_for_a_machine_receives_broadcasts(network: Network) -> None:
     switch, rover = network.switch(), network.machine("rover")
     network.plug(rover, switch)
     switch.add_tap("tap1")

@@ -1,4 +1,4 @@
-"""An emulator's port on a unix socket: whoever connects is heard, and may come and go."""
+"""An emulator's port on a unix socket: it reads from its client; clients may come and go."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def test_bytes_go_both_ways(port: SocketPort) -> None:
         assert line.recv(64) == b"* 22\r\n"
 
 
-def test_what_nobody_hears_is_lost(port: SocketPort) -> None:
+def test_what_no_client_receives_is_lost(port: SocketPort) -> None:
     assert port.write(b"lost") == 0
     with adapter(port) as line:
         port.write(b"heard")
         assert line.recv(64) == b"heard"
 
 
-def test_a_line_that_nobody_reads_holds_little(port: SocketPort) -> None:
+def test_a_line_that_no_client_reads_holds_little(port: SocketPort) -> None:
     with adapter(port):
         sent = [port.write(b"x" * 100) for _ in range(10_000)]
         assert sent[-1] == 0

@@ -23,8 +23,8 @@ FOLDERS = (
     "transport/nondum",
     "wheelhouse/nondum",
 )
-CODE = re.compile(r"[A-Z][A-Z0-9]+(_[A-Z0-9]+)*|E-[A-Z]+(-[A-Z]+)*")
-LIKELY = re.compile(r"(?:[A-Z][A-Z0-9]+(?:_[A-Z0-9]+)+|E-[A-Z]+(?:-[A-Z]+)*)(?= |$)")
+CODE = re.compile(r"[A-Z][A-Z0-9]+(_[A-Z0-9]+)*")
+LIKELY = re.compile(r"[A-Z][A-Z0-9]+(?:_[A-Z0-9]+)+(?= |$)")
 """What a string in the sources begins with when it is most probably a code."""
 NO_CODES = frozenset(
     {
@@ -35,7 +35,8 @@ NO_CODES = frozenset(
         *("ID_INPUT_MOUSE", "ID_INPUT_POINTINGSTICK", "ID_INPUT_TOUCHPAD", "ID_INPUT_TOUCHSCREEN"),
         *("LC_ALL", "LISTEN_FDS", "LISTEN_PID", "NO_COLOR", "SOURCE_DATE_EPOCH"),
         *("MALLOC_ARENA_MAX", "SCHED_IDLE", "VECLIB_MAXIMUM"),
-        *("NONDUM_CONTROL", "NONDUM_LAB", "NONDUM_ROOM", "NONDUM_SPARE_OF", "NONDUM_WORKER"),
+        *("NONDUM_CONTROL", "NONDUM_LAB", "NONDUM_PLACEHOLDER"),
+        *("NONDUM_SPARE_OF", "NONDUM_WORKER"),
         *("NONDUM_CODE", "NONDUM_EVENT", "NONDUM_LOGGER", "NONDUM_LOST", "SYSLOG_IDENTIFIER"),
         *("CODE_FILE", "CODE_FUNC", "CODE_LINE", "JOURNAL_STREAM"),
         *("NOTIFY_SOCKET", "WATCHDOG_PID", "WATCHDOG_USEC"),
@@ -99,7 +100,7 @@ def all_told() -> tuple[Told, ...]:
         told
         for path, tree in _trees().items()
         for scope in [tree, *(node for node in ast.walk(tree) if isinstance(node, FUNCTIONS))]
-        for told in _told_in(list(_inside(scope)), path)
+        for told in _told_in(list(_nodes_of(scope)), path)
     )
 
 
@@ -126,12 +127,12 @@ def _trees() -> Mapping[str, ast.Module]:
     }
 
 
-def _inside(scope: ast.AST) -> Iterator[ast.AST]:
+def _nodes_of(scope: ast.AST) -> Iterator[ast.AST]:
     """What is in a function (or, for a module, in none), in the order of the text."""
     for node in ast.iter_child_nodes(scope):
         if not isinstance(node, FUNCTIONS):
             yield node
-            yield from _inside(node)
+            yield from _nodes_of(node)
 
 
 def _told_in(nodes: Sequence[ast.AST], path: str) -> Iterator[Told]:

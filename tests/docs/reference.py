@@ -1,8 +1,8 @@
 """The parts of docs/ (and what `nondum explain` quotes) that say what the code says: made from it.
 
-    python -m tests.docs.reference        # writes them anew
+    python -m tests.docs.reference        # writes them again
 
-Each document begins with words of its own; what follows `MARK` comes from here.
+Each document begins with text that people write; what follows `MARK` comes from here.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _hook(name: str) -> str:
 
 
 def main() -> None:
-    """Write what follows the mark of each document anew."""
+    """Write again what follows the mark of each document."""
     for name, make in {**DOCUMENTS, "codes.md": codes.references}.items():
         path = DOCS / name
         words = path.read_text(encoding="utf-8").partition(MARK)[0]

@@ -55,7 +55,7 @@ def _message(head: str, cls: type[Any]) -> str:
 
 
 def _field(field: Field[Any], docs: dict[str, str]) -> str:
-    """A row; a type alias is a word of its own in the sources, and stays one."""
+    """A row; a type alias stays as it stands in the sources."""
     name = HEADER if field.name == "header" else docs.get(field.name, "")
     kind = str(field.type).replace("|", "\\|")
     return f"| `{field.name}` | `{kind}` | {_default(field)} | {name} |"

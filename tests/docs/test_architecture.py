@@ -25,8 +25,8 @@ def test_named_path_is_there(name: str) -> None:
 
 @pytest.fixture(scope="module")
 def sources() -> str:
-    rooms = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
-    modules = (path for room in rooms for path in (ROOT / room).rglob("*.py"))
+    folders = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
+    modules = (path for folder in folders for path in (ROOT / folder).rglob("*.py"))
     return "\n".join(path.read_text(encoding="utf-8") for path in modules)
 
 

@@ -25,7 +25,7 @@ Declare each in the module of its area in {TABLE}/, like the others there:
 def test_every_code_that_is_told_is_declared() -> None:
     told = {found.code: found.path for found in all_told()} | dict(mentioned())
     unknown = {code: told[code] for code in told.keys() - codes.every().keys() - NO_CODES}
-    assert not unknown, f"""codes that nobody declares: {unknown}
+    assert not unknown, f"""codes that no table declares: {unknown}
 {HOW}
 (A string that only looks like a code belongs into NO_CODES in tests/docs/codes.py.)"""
 

@@ -1,9 +1,9 @@
 """The long form of the tests of faults: `python -m tests.faults --minutes N`.
 
 Works off what was not done yet of each kind in turn, and adds to the results in a folder, so that
-it can be stopped and goes on where it was. `--points` takes so many of each kind, other ones for
-each `--seed`. `--table` writes docs/reliability/faults.md from the results; without `--minutes` it
-does nothing else.
+it can be stopped and goes on where it was. `--points` limits their number for each kind, and
+`--seed` draws them. `--table` writes docs/reliability/faults.md from the results; without
+`--minutes` it does nothing else.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from tests.campaign.rounds import Limit, Rounds
+from tests.campaign.progress import Limit, Progress
 from tests.faults import points, power, table
 from tests.faults.points import Point, Result, clean
 from tests.kit.fork_server import Nursery
@@ -33,7 +33,7 @@ from tests.kit.fork_server import Nursery
 FOLDER = Path("build/faults")
 """What was done so far; and what the points are made from, so that they stay what they are."""
 BATCH = 24
-"""So many of each kind in turn."""
+"""Points of each kind in turn."""
 
 FULL = {"boundary": 20, "kill": 2000, "moment": 1000, "error": 1500, "power": 1000}
 """What makes the campaign whole: of the first, times each row of the tables before and after."""
@@ -83,12 +83,12 @@ def _run(options: argparse.Namespace) -> None:
         for kind, points in planned.items()
     }
 
-    def kept() -> Rounds:
+    def kept() -> Progress:
         names = [f"{kind} {name}" for kind, name in found]
         wrong = [f"{r.kind} {r.name}" for r in found.values() if r.wrong]
-        counter = Rounds(total, tuple(names), tuple(wrong))
-        counter.write(options.folder)
-        return counter
+        progress = Progress(total, tuple(names), tuple(wrong))
+        progress.write(options.folder)
+        return progress
 
     kept()
     with ProcessPoolExecutor(options.jobs) as pool, results.open("a") as out:
@@ -125,7 +125,7 @@ def _results(
 
 
 def _planned(options: argparse.Namespace, counts: dict[str, int]) -> dict[str, list[Point]]:
-    """The points of each kind: all of them in their order, or so many that the seed has drawn."""
+    """The points of each kind: all in their order, or `--points` of them, drawn by `--seed`."""
     return {
         kind: list(itertools.islice(_drawn(kind, counts, options.seed), options.points))
         for kind in options.kinds

@@ -60,7 +60,7 @@ def make(folder: Path, count: int) -> list[Path]:
 
 
 def sound(drive: Path, number: int) -> None:
-    """A payload of its own."""
+    """A payload that is on no other drive."""
     part = Part(f"lamp{number}", SOUND)
     make_payload(drive, part, payload_id=f"org.example.lamp{number}")
 

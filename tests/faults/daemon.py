@@ -1,4 +1,4 @@
-"""A host's lifecycle in a process of its own, to be killed or to be given errors.
+"""A host's lifecycle in a separate process, to be killed or to be given errors.
 
 The orders are one JSON object: `root`, and optionally
 

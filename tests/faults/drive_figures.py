@@ -22,7 +22,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tests.campaign.rounds import Limit, Round
+from tests.campaign.progress import Limit, Round
 from tests.faults import crowds
 from tests.faults.footprint import slope
 from tests.faults.hostile import FAMILIES, Bench, HostileDrive
@@ -74,7 +74,7 @@ def hostile(root: Path, options: argparse.Namespace) -> Figures:
 
 
 def yanks(root: Path, options: argparse.Namespace) -> Figures:
-    """Yank a drive at so many points."""
+    """Yank a drive at `--points` moments."""
 
     async def run() -> Figures:
         async with bench(root) as made:
@@ -263,8 +263,8 @@ WHILE = {
 def _crowd(told: Figures) -> Iterator[str]:
     yield "## A crowd of drives"
     yield ""
-    yield f"{told['drives']} drives plugged in within {told['plugged_s']:.1f} s: by turns a payload"
-    yield "of its own, a copy of one and the same, one with a changed file, and one without any."
+    yield f"{told['drives']} drives plugged in within {told['plugged_s']:.1f} s: in turn with"
+    yield "a new payload, a copy of one and the same, one with a changed file, and without any."
     yield ""
     yield "| | reached | aim |"
     yield "|---|---|---|"

@@ -15,7 +15,7 @@ from nondum.host.sandbox.helper.mountinfo import mounted_below
 
 CALM, CALM_S = 8, 1.6
 OWN = ("catalogue", "staging")
-"""Of the state folder: what has rules of its own for how long it stays."""
+"""Of the state folder: what is not counted, for it has its own rules of how long it stays."""
 
 
 @dataclass(frozen=True)

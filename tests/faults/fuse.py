@@ -1,7 +1,7 @@
 """A drive whose device answers as a test likes: other bytes each time, none at all, or for ever.
 
 A small server of the kernel's FUSE protocol (linux/fuse.h, version 7.31) over /dev/fuse, in a
-thread of its own. It serves a folder, read-only; one file in it may be given other answers.
+separate thread. It serves a folder, read-only; one file in it may be given other answers.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _FLAGS = 0x1 | 0x2 | 0x4 | 0x8
 """Read-only, and without set-uid, devices and execution."""
 
 _FORCE, _DETACH = 1, 2
-"""Of umount2(2). The first ends the connection, whoever still waits for an answer."""
+"""Of umount2(2). The first ends the connection even while a process waits for an answer."""
 _END_S = 60.0
 
 _libc = ctypes.CDLL(None, use_errno=True)
@@ -51,7 +51,7 @@ class FuseDrive:
     mount: Path
     """Where it can be read."""
     answers: dict[str, Answer] = field(default_factory=dict)
-    """Path → what is answered to whoever reads it."""
+    """Path → what its readers get."""
     endless: set[str] = field(default_factory=set)
     """Folders that have more and more names."""
     reads: dict[str, int] = field(default_factory=dict)
@@ -75,7 +75,7 @@ class FuseDrive:
                 if error.errno in (errno.ENOENT, errno.EINTR):
                     continue
                 raise
-            # Each in a thread of its own: one that blocks holds up nobody else.
+            # Each in its own thread: one that blocks holds up no other request.
             threading.Thread(target=self._answer, args=(request,), daemon=True).start()
 
     def _answer(self, request: bytes) -> None:

@@ -30,7 +30,7 @@ class Stuck(Exception):
 
 @dataclass
 class Player:
-    """Has its hands on one daemon; give `play` to `Nursery.run`."""
+    """Acts on one daemon from outside; give `play` to `Nursery.run`."""
 
     root: Path
     script: Sequence[str] = ("plug a", "pull a")

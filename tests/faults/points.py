@@ -56,15 +56,15 @@ FAILING: dict[str, tuple[str, ...]] = {
     "vfork": ("ENOMEM", "EAGAIN"),
     "execve": ("ENOMEM", "EIO"),
 }
-"""System calls that are given errors, and which of them: those that a failing disk, or one without
-room, and a process without descriptors or memory meet."""
+"""System calls that are given errors, and which of them: those that a failing or full disk,
+and a process without descriptors or memory, meet."""
 
 KILLING = (
     *("openat", "write", "pwrite64", "fsync", "fdatasync", "syncfs", "rename", "link", "unlink"),
     *("unlinkat", "mkdir", "rmdir", "symlink", "ftruncate", "sendmsg", "recvmsg", "sendto"),
     *("close", "epoll_wait", "vfork", "clone", "clone3", "socketpair", "pipe2", "execve"),
 )
-"""System calls at which a daemon, or whoever of its processes makes them, is killed."""
+"""System calls at which a daemon, or the one of its processes that makes them, is killed."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Point:
 
 
 def boundaries(times: int) -> Iterator[Point]:
-    """Before and after the commit of each row of both tables, so many times."""
+    """Before and after the commit of each row of both tables, `times` times."""
     for nth in range(times):
         for when in ("BEFORE", "AFTER"):
             for of, rows in (("payload", TRANSITIONS), ("component", COMPONENT_TRANSITIONS)):
@@ -121,7 +121,7 @@ def moments(count: int, seed: int = 20) -> Iterator[Point]:
 
 
 def calls(kind: str, counts: dict[str, int], count: int, seed: int = 3) -> Iterator[Point]:
-    """So many of the points that system calls make: the nth of each kind in whatever thread."""
+    """`count` of the points that system calls make: the nth of each kind in any thread."""
     chance = random.Random(f"{kind} {seed}")
     every: list[Point] = []
     for call, most in counts.items():
@@ -193,7 +193,7 @@ def _call(point: Point, nursery: Nursery, folder: Path, what: str) -> Result:
     inject = f"inject={call}:{what}:when={nth}"
     options = ["-e", f"trace={call}", "-e", inject, "-o", "/dev/null"]
     code, player = _play(nursery, folder, options)
-    # What fails when all is written down, and nothing runs any more, is nobody's trouble.
+    # What fails when all is written down, and nothing runs any more, does no harm.
     fine = code == 0 or has_stopped(folder) or (point.kind == "kill" and code == -9)
     wrong = [] if fine else [f"it ended with {code}; {logged(folder / 'log')}"]
     codes = codes_of(folder)
@@ -229,8 +229,8 @@ def _result(
 
 
 def out_of_place(ended: Ended) -> list[str]:
-    """What is not where the lamp belongs when nothing is in its way: in force, or older than what
-    was here before."""
+    """What is not where the lamp belongs when nothing is in its way: active, or older than what was
+    here before."""
     fine = {Step.ACTIVE, Step.SUPERSEDED}
     is_older = set(ended.codes) <= {"ROLLBACK"} and Step.REFUSED in ended.steps.values()
     wrong = [] if set(ended.steps.values()) <= fine or is_older else [f"came to {ended}"]

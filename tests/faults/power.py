@@ -71,8 +71,8 @@ def live(nursery: Nursery, folder: Path, script: Sequence[str] = SCRIPT) -> Life
 
 
 def cuts(life: Life, count: int, seed: int = 5) -> Iterator[tuple[int, int | None]]:
-    """So many ways to cut it short: after how many writes, and the chance (a seed) by which what
-    was not flushed is lost; None: all of it is there."""
+    """`count` ways to cut it short: after how many writes, and the seed that chooses which of the
+    unflushed writes are lost; None: none of them."""
     chance = random.Random(seed)
     for nth in range(count):
         yield chance.randrange(len(life.done) + 1), None if nth % 3 == 0 else nth
@@ -96,7 +96,7 @@ def fail(life: Life, after: int, seed: int | None, folder: Path) -> Ended:
     return replace(ended, wrong=tuple(wrong))
 
 
-def promises(life: Life) -> Iterator[int]:
+def promised_after(life: Life) -> Iterator[int]:
     """After how many writes something was promised, each time."""
     ends = [write.end for write in life.done]
     for log in kept.moments(life.root):

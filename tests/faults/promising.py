@@ -101,18 +101,18 @@ def follow_trust(folders: Folders) -> None:
 
 
 async def keep_peers(folders: Folders) -> None:
-    """This host's key and certificate, whom it trusts and whom no more, and what is pinned."""
-    keeper = await PeerTrustStore.open(folders.peers, "spot")
+    """This host's key and certificate, the hosts that it trusts or has revoked, and pins."""
+    trust_store = await PeerTrustStore.open(folders.peers, "spot")
     promise(Kind.WHOLE, folders.peers / KEY_NAME)
     other = HostKeys.generate().public
-    await keeper.pair(other, "rover")
+    await trust_store.pair(other, "rover")
     promise(Kind.WHOLE, folders.peers / TRUST_NAME)
-    await keeper.revoke(other, "stolen")
+    await trust_store.revoke(other, "stolen")
     promise(Kind.WHOLE, folders.peers / TRUST_NAME)
     _, secret = new_fleet()
     begins, ends = datetime(2020, 1, 1, tzinfo=UTC), datetime(2220, 1, 1, tzinfo=UTC)
-    certificate = issue(secret, "spot", keeper.key, not_before=begins, not_after=ends)
-    await keeper.certify(certificate.to_bytes())
+    certificate = issue(secret, "spot", trust_store.key, not_before=begins, not_after=ends)
+    await trust_store.certify(certificate.to_bytes())
     promise(Kind.WHOLE, folders.peers / CERTIFICATE_NAME)
     pins = await Pins.open(folders.root / "places.json")
     await pins.put("org.example.lamp", "mule")
@@ -152,7 +152,7 @@ def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:
         "reserve_mb": 0,
         "confinement": 0,
         "allow_unsigned": True,
-        "room": None,
+        "headroom": None,
     }
     install_job.install(arguments, told)
     promise(Kind.SAFE, kept)

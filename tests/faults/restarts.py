@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from demo.robot import TooLate
-from tests.campaign.rounds import Limit, Rounds
+from tests.campaign.progress import Limit, Progress
 from tests.faults.play import is_dead
 from tests.faults.ways import Way
 from tests.kit.evidence import logged
@@ -54,19 +54,19 @@ def main() -> int:
     say(f"seed {options.seed}")
     folder, limit = options.folder.resolve(), Limit(options.minutes)
     names = [f"{options.seed}-{number}" for number in range(math.ceil(options.times / TIMES))]
-    score = Score.of(names, Rounds.read(folder))
+    score = Score.of(names, Progress.read(folder))
     left = iter([name for name in names if name not in score.done])
     with _load(options.busy), ThreadPoolExecutor(options.jobs) as pool:
         running: set[Future[Result]] = set()
         while True:
-            room = 0 if limit.is_over else options.jobs - len(running)
-            running |= {pool.submit(_try, folder, name) for name in itertools.islice(left, room)}
+            free = 0 if limit.is_over else options.jobs - len(running)
+            running |= {pool.submit(_try, folder, name) for name in itertools.islice(left, free)}
             if not running:
                 break
             ended, running = wait(running, return_when=FIRST_COMPLETED)
             for result in (future.result() for future in ended):
                 score.add(result)
-            Rounds(len(names), tuple(score.done), tuple(score.wrong)).write(folder)
+            Progress(len(names), tuple(score.done), tuple(score.wrong)).write(folder)
     right = (len(score.done) - len(score.wrong)) * TIMES
     say(f"{right} of {len(score.done) * TIMES}, {len(score.wrong)} wrong")
     return bool(score.wrong)
@@ -91,7 +91,7 @@ class Score:
     wrong: list[str]
 
     @classmethod
-    def of(cls, names: Collection[str], former: Rounds | None) -> Score:
+    def of(cls, names: Collection[str], former: Progress | None) -> Score:
         """What is known of these names."""
         done, failed = (former.done, former.failed) if former else ((), ())
         return cls([n for n in done if n in names], [n for n in failed if n in names])

@@ -1,4 +1,4 @@
-"""The clock of the wall jumps by years under a running host: nothing is decided by it."""
+"""The wall clock jumps by years under a running host: nothing is decided by it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ TORCH_ID = "org.example.torch"
 
 
 def disk_of(root: Path, options: str) -> Path:
-    """A host's root whose state folder is on a file system of its own."""
+    """A host's root whose state folder is a separate file system."""
     (root / "state").mkdir(parents=True)
     mount = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(root / "state")]
     subprocess.run(mount, check=True)
@@ -53,7 +53,7 @@ def small_disk(mounted: Callable[[str], Path]) -> Path:
 
 
 def fill(file: Path) -> None:
-    """Take all the room that is left."""
+    """Take all the space that is left."""
     with file.open("wb") as out:
         try:
             while out.write(bytes(64 * 1024)):
@@ -99,8 +99,8 @@ async def test_full_disk_while_installing_rolls_back(small_disk: Path, tmp_path:
 async def test_full_disk_does_not_keep_the_catalogue_from_being_written(
     mounted: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """Some of it was set aside, and is so again once there is room; then, what was refused for
-    that comes in by itself."""
+    """A reserve was set aside, and is again once there is space; then, the payload that was refused
+    for that comes in by itself."""
     sound(tmp_path / "drive")
     root = mounted("size=160m")
     async with host_in_process(root) as host:
@@ -143,9 +143,7 @@ async def test_withdrawal_does_not_wait_for_a_disk_that_cannot_be_written(
         assert not host.snapshot.payloads
 
 
-async def test_disk_without_room_for_files_is_told(
-    mounted: Callable[[str], Path], tmp_path: Path
-) -> None:
+async def test_disk_without_inodes_is_told(mounted: Callable[[str], Path], tmp_path: Path) -> None:
     sound(tmp_path / "drive")
     root = mounted("size=128m,nr_inodes=40")
     async with host_in_process(root) as host:
@@ -212,7 +210,7 @@ async def test_all_that_is_here_outlives_the_catalogue(
         assert not left_over(host.folders)
 
 
-async def test_older_release_is_refused_by_a_catalogue_made_anew(tmp_path: Path) -> None:
+async def test_older_release_is_refused_by_a_rebuilt_catalogue(tmp_path: Path) -> None:
     """What is installed for good tells what was active here."""
     newer(tmp_path / "usb")
     installed = tmp_path / "usb/nondum" / LAMP_ID

@@ -1,4 +1,4 @@
-"""Hostile drives, once through one daemon: each is told with its code, and nobody else notices.
+"""Hostile drives, once through one daemon: each is told with its code, and all else goes on.
 
 One of each kind; all of them, ten times through, is `python -m tests.faults.drive_figures hostile`.
 """

@@ -93,8 +93,8 @@ async def unreadable(host: HostInProcess, code: str) -> None:
 
 
 async def test_nothing_is_read_twice(tmp_path: Path) -> None:
-    """Whoever answers otherwise at the second reading is never asked; but for the list, which is
-    compared."""
+    """A device that would answer otherwise at the second reading is not asked again; but for the
+    list, which is compared."""
     paths = [MANIFEST, f"{FOLDER}/index.json", f"{FOLDER}/pylock.lamp.toml", wheel(tmp_path)]
     answers = {path: changing(tmp_path, path) for path in paths}
     async with lying(tmp_path, answers=answers) as (host, drive):
@@ -221,7 +221,7 @@ async def test_device_that_fails_is_gone(tmp_path: Path, path: str, number: int)
 async def test_device_that_is_silent_is_given_up(
     clock: VirtualClock, tmp_path: Path, path: str
 ) -> None:
-    """Its child hangs in the kernel; nobody else waits for it."""
+    """Its child hangs in the kernel; no other process waits for it."""
     asked, over = threading.Event(), threading.Event()
 
     def answer(opening: int, offset: int, size: int) -> bytes:

@@ -40,7 +40,7 @@ def test_power_fails_after_some_write(life: Life, tmp_path: Path, nth: int) -> N
 
 def test_what_was_promised_is_on_the_disk_from_then_on(life: Life, tmp_path: Path) -> None:
     """At every promise of that life, with all lost that the disk was not told to flush."""
-    at = list(power.promises(life))
+    at = list(power.promised_after(life))
     assert len(at) > len(power.KEEPS) * 7
     lost = {}
     for after in at:

@@ -54,7 +54,7 @@ async def plug_good(host: HostInProcess, root: Path) -> None:
     await host.until_step(GOOD, Step.ACTIVE)
 
 
-async def until_heard(host: HostInProcess, kind: type[Event]) -> None:
+async def until_event(host: HostInProcess, kind: type[Event]) -> None:
     await host.until(lambda: any(type(event) is kind for event in host.heard))
 
 
@@ -68,7 +68,7 @@ async def test_pull_at_each_phase(tmp_path: Path) -> None:
             make_payload(drive, lamp, payload_id=LAMP_ID, release=number)
             host.heard.clear()
             host.plug(drive)
-            await until_heard(host, phase)
+            await until_event(host, phase)
             host.pull()
             await check_undone(host, tmp_path)
 
@@ -80,7 +80,7 @@ async def test_pull_in_the_middle_of_a_behaviour(tmp_path: Path) -> None:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         host.workers.behave("lamp", "shine", {"u": "spot__lamp__lamp"})
-        await until_heard(host, events.BehaviourEstablished)
+        await until_event(host, events.BehaviourEstablished)
         host.pull()
         await check_undone(host, tmp_path)
         ended = [event for event in host.heard if isinstance(event, events.BehaviourEnded)]

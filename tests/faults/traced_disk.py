@@ -106,11 +106,11 @@ def _events(lines: Sequence[str], folder: Path) -> Iterator[Event]:
         thread, resumed, name, rest = found.groups()
         if rest.endswith("<unfinished ...>"):
             begun[thread] = rest
-            if name in SYNCS and any(paths := _inside(name, rest, folder)):
+            if name in SYNCS and any(paths := _changed_paths(name, rest, folder)):
                 yield Begun(name, paths, thread)
             continue
         arguments, _, result = (begun.pop(thread, "") + rest if resumed else rest).rpartition(" = ")
-        paths = _inside(name, arguments, folder)
+        paths = _changed_paths(name, arguments, folder)
         if name in _SAID and "/promise:" in arguments:
             _, kind, *said = arguments[arguments.index("/promise:") :].partition('"')[0].split(":")
             yield Promise(kind, tuple(_relative(path, folder) for path in said))
@@ -120,7 +120,7 @@ def _events(lines: Sequence[str], folder: Path) -> Iterator[Event]:
             yield Call(name, paths, thread, creates or is_creat, truncates or is_creat)
 
 
-def _inside(name: str, arguments: str, folder: Path) -> tuple[str, ...]:
+def _changed_paths(name: str, arguments: str, folder: Path) -> tuple[str, ...]:
     """The paths that a call changes, as far as they are in the folder."""
     if name in (*SYNCS, *_WRITES) and name != "truncate":
         opened = [path for number, path, _ in _PART.findall(arguments) if number]

@@ -34,9 +34,9 @@ CUT_TO = 1024**2
 PRUNED_S = 20.0
 IDLE_S = 0.5
 CALM = 3
-"""So often in a row nothing may be left."""
+"""Looks in a row at which nothing may be left."""
 AGAIN = 25
-"""After so many, the time that all takes is measured anew: the machine has other work, too."""
+"""Yanks after which the time that all takes is measured again: the machine has other work, too."""
 
 
 @dataclass
@@ -167,7 +167,7 @@ async def bench(root: Path) -> AsyncIterator[Bench]:
 
 
 async def yank_all(made: Bench, points: int, *, seed: int) -> Yanks:
-    """Yank at so many points, uniformly from the coming of the drive until it idles."""
+    """Yank at `points` moments, uniformly from the coming of the drive until it idles."""
     moments = random.Random(seed)
     for number in range(points):
         if number % AGAIN == 0:

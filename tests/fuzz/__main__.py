@@ -1,6 +1,6 @@
 """Fuzz every reader, guided by coverage: `python -m tests.fuzz [TARGET…] [--minutes N]`.
 
-Needs atheris (`./run campaign fuzz` installs it). Each target runs in a process of its own, as many
+Needs atheris (`./run campaign fuzz` installs it). Each target runs in a separate process, as many
 at a time as there are cores; what it finds is written to a file beside the report. With a folder
 for what was done (`--folder`) it can be stopped and goes on where it was.
 """
@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from tests.campaign.rounds import Limit, Round
+from tests.campaign.progress import Limit, Round
 from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
 

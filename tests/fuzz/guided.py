@@ -1,7 +1,7 @@
-"""One target in a process of its own under atheris.
+"""One target in a separate process under atheris.
 
-`python -m tests.fuzz.guided TARGET CASES DIR SECONDS`: it ends after so many cases or seconds
-(0: no limit of time).
+`python -m tests.fuzz.guided TARGET CASES DIR SECONDS`: it ends after CASES cases or SECONDS
+seconds (0: no limit of time).
 
 DIR/corpus keeps what reached new code, DIR/report.json says how it went, DIR/crash-… holds an input
 that broke a rule.

@@ -1,4 +1,4 @@
-"""Whatever bytes come, a reader gives a value or an error of nondum's own, soon and in little room.
+"""From any bytes, a reader makes a value or a nondum error, soon and in little memory.
 
 The long form goes by coverage: `python -m tests.fuzz`.
 """
@@ -25,7 +25,7 @@ def seeds_of(target: Target) -> list[bytes]:
 
 @each
 def test_its_seeds_are_read(target: Target) -> None:
-    """Else all that is mutated from them would be turned away at the door."""
+    """Else the reader would refuse all that is mutated from them at its first check."""
     assert [tried(target, seed).refused for seed in target.seeds()] == [""] * len(target.seeds())
 
 

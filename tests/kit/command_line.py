@@ -55,7 +55,7 @@ def nondum(*arguments: str | Path, **environment: str) -> Ran:
             module,
             stdout=out.fileno(),
             stderr=err.fileno(),
-            env=quiet_environment() | environment,
+            env=clean_environment() | environment,
         )
         try:
             code = process.wait(PATIENCE_S)
@@ -70,7 +70,7 @@ def in_new_interpreter(*arguments: str | Path, **environment: str) -> Ran:
         command(*arguments),
         capture_output=True,
         text=True,
-        env=quiet_environment() | environment,
+        env=clean_environment() | environment,
         timeout=PATIENCE_S,
         check=False,
     )
@@ -100,7 +100,7 @@ def at_terminal(
         stdin=theirs,
         stdout=theirs,
         stderr=theirs,
-        env=quiet_environment() | {"TERM": "xterm"} | dict(environment or {}),
+        env=clean_environment() | {"TERM": "xterm"} | dict(environment or {}),
     )
     os.close(theirs)
     shown = b""
@@ -123,7 +123,7 @@ def command(*arguments: str | Path) -> list[str]:
     return [*NONDUM, *map(str, arguments)]
 
 
-def quiet_environment() -> dict[str, str]:
+def clean_environment() -> dict[str, str]:
     """This process's environment, less what would change what is printed, or who answers."""
     changing = {"NONDUM_CONTROL", "COLUMNS", "NO_COLOR", "FORCE_COLOR"}
     return {key: value for key, value in os.environ.items() if key not in changing}

@@ -13,7 +13,7 @@ ENDLESS = """(define (domain holes)
 
 
 def endless() -> str:
-    """Fourteen pigeons for thirteen holes, which nobody proves by looking at all states."""
+    """Fourteen pigeons for thirteen holes, which no search through all states proves."""
     pigeons, holes = [f"p{n}" for n in range(14)], [f"h{n}" for n in range(13)]
     outside = [f"(out {pigeon})" for pigeon in pigeons] + [f"(free {hole})" for hole in holes]
     return (

@@ -1,7 +1,7 @@
 """Loop devices: block devices on image files, for tests. They need root.
 
-A node is used again by whoever comes next, and that may be another test: what is done to one at
-the end is done only if it is still on one's own image.
+The kernel gives a node that is free to the next process, which may be another test: at its end, a
+test acts on a node only if the node is still on its own image.
 """
 
 from __future__ import annotations

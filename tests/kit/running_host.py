@@ -1,4 +1,4 @@
-"""A whole host under test: a daemon with a life of its own, met only as people meet it.
+"""A whole host under test: a daemon in a separate process, used only as people use it.
 
 Everything is done through its control socket, its command line, its slots and its ports; what it
 leaves behind is looked for in /proc and on disk.
@@ -22,7 +22,7 @@ from typing import Any
 
 from demo.robot import NONDUM, Robot, TooLate, View, configuration
 from tests.kit import evidence
-from tests.kit.command_line import Ran, command, nondum, quiet_environment
+from tests.kit.command_line import Ran, clean_environment, command, nondum
 from tests.kit.fork_server import Forked, fork_server, module_of
 from tests.kit.payloads import Part, make_payload
 from tests.kit.traces import Traces, former_payloads
@@ -168,7 +168,7 @@ class RunningHost(Robot):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=quiet_environment() | {"PYTHONUNBUFFERED": "1"},
+            env=clean_environment() | {"PYTHONUNBUFFERED": "1"},
         )
         with process:
             try:

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from demo.robot import TooLate
-from tests.kit.command_line import command, quiet_environment
+from tests.kit.command_line import clean_environment, command
 from tests.kit.until import PATIENCE_S
 
 _PART = re.compile(r"\x1b\[([?0-9;]*)([a-zA-Z])|(\r)|(\n)|([^\x1b\r\n]+)")
@@ -139,7 +139,7 @@ class Terminal:
             return False
         try:
             self._unread += self._decoder.decode(os.read(self._end, 65536))
-        except OSError:  # EIO: nobody has the other end open any more (pty(7))
+        except OSError:  # EIO: no process has the other end open any more (pty(7))
             return False
         cut = _CUT.search(self._unread)
         whole = cut.start() if cut else len(self._unread)
@@ -161,7 +161,7 @@ def terminal(
         stdin=theirs,
         stdout=theirs,
         stderr=theirs,
-        env=quiet_environment() | {"TERM": "xterm"} | own_size | environment,
+        env=clean_environment() | {"TERM": "xterm"} | own_size | environment,
         start_new_session=True,
     )
     os.close(theirs)

@@ -132,7 +132,7 @@ def trust_of(
 
 
 def signed(trust: Trust | str, *signers: Key, namespace: str = sshsig.TRUST) -> SignedFile:
-    """A trust file, signed by some; nobody: without a signature file."""
+    """A trust file, signed with some keys; none: without a signature file."""
     data = (trust if isinstance(trust, str) else trust_text.to_text(trust)).encode()
     signatures = b"".join(key.sign(data, namespace) for key in signers)
     return SignedFile(data, signatures or None)

@@ -1,4 +1,4 @@
-"""What the event loop watches: how many more descriptors, as for a user who has no more watches."""
+"""Limits what the event loop watches, as for a user who has no more watches."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 
 @contextlib.contextmanager
 def watches_left(left: int) -> Iterator[None]:
-    """The running loop watches so many more, and refuses all others (ENOSPC, epoll_ctl(2))."""
+    """The running loop watches `left` more descriptors, and no others (ENOSPC, epoll_ctl(2))."""
     loop, numbers = asyncio.get_running_loop(), itertools.count()
     add_reader = loop.add_reader
 

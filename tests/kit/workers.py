@@ -39,14 +39,14 @@ _E = TypeVar("_E", bound=Event)
 
 
 @functools.cache
-def standing() -> ConfinementState:
+def confinement_state() -> ConfinementState:
     """How workers are tested."""
-    return confinement_choice.standing(parse_wanted(LEVEL), Level.NONE)
+    return confinement_choice.confinement_state(parse_wanted(LEVEL), Level.NONE)
 
 
 def level() -> Level:
     """The level at which workers are tested."""
-    return standing().level
+    return confinement_state().level
 
 
 @dataclass
@@ -63,7 +63,7 @@ class WorkersUnderTest:
     def __post_init__(self) -> None:
         if self.confinement is None:
             self.confinement = confinement_choice.confinement(
-                standing(), (self.folder, SDK, LIBRARIES)
+                confinement_state(), (self.folder, SDK, LIBRARIES)
             )
         launcher = WorkerLauncher(self.confinement)
         self.workers = Workers(HOST, self._on_event, launcher=launcher, timing=self.timing)
@@ -130,7 +130,7 @@ class WorkersUnderTest:
         )
 
     async def until_ready(self, times: int) -> None:
-        """Wait until so many starts of workers have succeeded."""
+        """Wait until `times` starts of workers have succeeded."""
         await self.until(WorkerReady, lambda _: len(self.told(WorkerReady)) >= times)
 
     def told(self, kind: type[_E]) -> list[_E]:
@@ -158,7 +158,7 @@ class WorkersUnderTest:
         raise LookupError(f"{component} has no process {told}")
 
     async def until_exited(self, times: int) -> None:
-        """Wait until so many workers have ended that were not to end."""
+        """Wait until `times` workers have ended that were not to end."""
         await self.until(WorkerExited, lambda _: len(self.told(WorkerExited)) >= times)
 
     async def _next(self, kind: type[_E], test: Callable[[_E], bool]) -> _E:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.campaign.rounds import Limit, Round, work_off
+from tests.campaign.progress import Limit, Round, work_off
 from tests.kit.payloads import sdk_wheel
 from tests.lab.building import built
 from tests.lab.lab import Lab

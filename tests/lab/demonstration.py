@@ -80,11 +80,11 @@ def serial(name: str) -> str:
     return ADAPTERS[name]["ID_SERIAL"].rpartition("_")[2]
 
 
-class Heard:
-    """A stream, as `nondum streams --follow` shows it inside, from now until the stream ends."""
+class FollowedStream:
+    """A stream, as `nondum streams --follow` shows it in the machine, until the stream ends."""
 
     def __init__(self, host: Installed, kind: str) -> None:
-        """Begin to hear the only stream of a type."""
+        """Begin to follow the only stream of a type."""
         self._machine = host.machine
         rows = json.loads(host.machine.run("nondum streams --json"))
         (stream,) = [row["stream"] for row in rows if row["type"] == kind]

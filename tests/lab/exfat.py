@@ -22,7 +22,7 @@ _NAME_LETTERS = 15
 def fill(image: Path, content: Path) -> None:
     """Write what is in a folder into an empty file system that mkfs.exfat has made.
 
-    Raises `ValueError` when there is no room.
+    Raises `ValueError` when there is too little space.
     """
     data = bytearray(image.read_bytes())
     volume = _Volume.of(data)
@@ -65,10 +65,10 @@ class _Volume:
         return bool(self.data[self.bitmap + number // 8] >> number % 8 & 1)
 
     def store(self, content: bytes) -> int:
-        """Write to clusters that nobody has yet; answers the first one's number."""
+        """Write to clusters that are free; answers the first one's number."""
         first, count = self.next, -(-len(content) // self.cluster)
         if first + count > self.clusters + 2:
-            raise ValueError(f"no room for {len(content)} bytes")
+            raise ValueError(f"no space for {len(content)} bytes")
         self.next += count
         for number in range(first - 2, self.next - 2):
             self.data[self.bitmap + number // 8] |= 1 << number % 8

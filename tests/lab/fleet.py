@@ -13,7 +13,7 @@ KEY, CERTIFICATE, PUBLIC = "/run/lab/host.pub", "/run/lab/certificate", "/run/la
 
 
 class Fleet:
-    """Hosts that it has admitted let each other in, and nobody else."""
+    """Hosts that it has admitted accept each other, and no other host."""
 
     def __init__(self, folder: Path) -> None:
         """Make its keys, in a new folder."""

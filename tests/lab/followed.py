@@ -49,7 +49,7 @@ class Followed(Installed):
         return cls(host.machine, host.name)
 
     def status(self) -> View | None:
-        """The last status that was written; None while nobody tells."""
+        """The last status that was written; None while there is none."""
         lines = self.machine.attempt(LOOK).out.split("\n")[:-1]  # the last one is not whole
         if not lines:
             return None

@@ -1,6 +1,6 @@
 """Programs of another processor, run on this machine: needed to build a root file system for it.
 
-The kernel hands them to a user-mode QEMU; see its Documentation/admin-guide/binfmt-misc.rst.
+The kernel passes them to a user-mode QEMU; see its Documentation/admin-guide/binfmt-misc.rst.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from tests.lab.recipe import Recipe
 FORMATS = Path("/proc/sys/fs/binfmt_misc")
 KEPT = Path("/run/nondum-lab/binfmt_misc")
 """Where it stays mounted, so that the kernel keeps what it was told: something mounted below /proc
-changes what rooms of workers may mount (mount_namespaces(7))."""
+changes what the sandboxes of workers may mount (mount_namespaces(7))."""
 
 
 def see_it_run(recipe: Recipe) -> None:

@@ -1,7 +1,7 @@
 """An emulated instrument on a serial line, and the plugin that reads it: a gauge that counts.
 
-The instrument sends a line whenever it has counted on; whoever reads it knows that number only from
-the bytes.
+The instrument sends a line whenever it has counted on; its readers know that number only
+from the bytes.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def reader(match: Mapping[str, str]) -> Part:
     return Part("gauge", PLUGIN.replace("MATCH", repr(dict(match))), manifest=need)
 
 
-class UsageReader:
+class Gauge:
     """The instrument, switched on."""
 
     def __init__(self, path: Path) -> None:
@@ -104,9 +104,9 @@ class UsageReader:
 
 
 @contextmanager
-def switched_on(path: Path) -> Iterator[UsageReader]:
+def switched_on(path: Path) -> Iterator[Gauge]:
     """A gauge at a socket."""
-    gauge = UsageReader(path)
+    gauge = Gauge(path)
     try:
         yield gauge
     finally:

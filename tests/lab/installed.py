@@ -92,7 +92,7 @@ class Installed:
         self.machine.run(f"systemctl start --no-block {SERVICE}", timeout_s=PATIENCE_S)
 
     def wait_until_started(self) -> None:
-        """Wait until somebody answers, whoever started the service."""
+        """Wait until the daemon answers, however the service was started."""
         self.until("an answer", lambda view: view)
 
     def stop(self) -> None:
@@ -105,7 +105,7 @@ class Installed:
         self.machine.run("rm -rf /var/lib/nondum/* /var/lib/private/nondum/*")
 
     def status(self) -> View | None:
-        """What `nondum status --json` shows; None while nobody answers."""
+        """What `nondum status --json` shows; None while the daemon does not answer."""
         seen = self.machine.attempt("nondum status --json", timeout_s=PATIENCE_S)
         return json.loads(seen.out) if seen.status == 0 else None
 
@@ -133,8 +133,8 @@ class Installed:
         raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
 
     def components(self) -> list[View]:
-        """What `nondum components --json` shows, peers' components too; nothing while nobody
-        answers."""
+        """What `nondum components --json` shows, peers' components too; nothing while the
+        daemon does not answer."""
         seen = self.machine.attempt("nondum components --json", timeout_s=PATIENCE_S)
         rows: list[View] = seen.json() if seen.status == 0 else []
         return rows
@@ -158,7 +158,7 @@ class Installed:
             here = {row["peer"] for row in seen.json() if row["state"] == "here"}
             return True if here == {*wanted} else None
 
-        what = f"{' and '.join(wanted) or 'nobody'} at {self.name}"
+        what = f"{' and '.join(wanted) or 'no other host'} at {self.name}"
         self.machine.until(what, found, PATIENCE_S, LOOK_S)
 
     def until_goal(self, goal: str, state: str) -> View:

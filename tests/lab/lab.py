@@ -33,7 +33,7 @@ class Lab:
     work: Path
     """A folder with a short path, for all that is made on the way."""
     brought: Path | None = None
-    """A payload, or a drive, of whoever runs the laboratory."""
+    """A payload, or a drive, from the user of the laboratory."""
     is_alone: bool = True
     """Whether nothing else runs beside it, so that what is measured goes into the documents."""
     machines: list[Machine] = field(default_factory=list)
@@ -137,7 +137,7 @@ class Lab:
         return fat_stick(content.parent / "stick.img", content)
 
     def payload(self, name: str, *parts: Part, **options: Any) -> Path:
-        """What is on such a stick: a folder, in a folder of its own."""
+        """The content of such a stick: a folder, in a new folder."""
         content = self.folder() / "files"
         fitting = [self._fitting(part) for part in parts]
         make_payload(content, *fitting, payload_id=f"org.example.{name}", **options)

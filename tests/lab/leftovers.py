@@ -32,7 +32,7 @@ class Seen:
 
 
 def seen(host: Followed) -> Seen | None:
-    """What there is now; None while nobody answers."""
+    """What there is now; None while the daemon does not answer."""
     view = host.status()
     if view is None:
         return None

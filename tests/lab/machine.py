@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 class Machine:
-    """A machine with a disk of its own, which outlives its boots. Call `close` at last."""
+    """A machine with its own disk, which outlives its boots. Call `close` at last."""
 
     def __init__(
         self,
@@ -204,7 +204,7 @@ class Machine:
         """Plug a USB serial adapter in (an FTDI, 0403:6001); answers its name for `pull_line`.
 
         `path` is the unix socket at which an emulated instrument listens; it is called again
-        whenever it hangs up. None: nobody is at the other end.
+        whenever it hangs up. None: nothing is at the other end.
         """
         return self._usb.plug_line(path, port, serial)
 
@@ -276,7 +276,7 @@ class Machine:
         kernel = [f"console={recipe.terminal}", "panic=-1", "quiet", "no_timer_check"]
         kernel.append(f"earlyprintk={recipe.terminal}")  # what it says before there is a console
         if self.socket:
-            kernel.append("net.ifnames=0")  # or udev renames its card under our hands
+            kernel.append("net.ifnames=0")  # or udev renames its card meanwhile
         for image in self._drives:
             disks += ["-drive", f"file={image},format=raw,if=virtio,readonly=on"]
         return [

@@ -52,7 +52,7 @@ class Socket:
         return ("-netdev", tap, "-device", f"virtio-net-pci,netdev=lan,mac={self.mac},romfile=")
 
     def pull(self) -> None:
-        """Pull the cable out where the network is: the machine sees its link up, and nobody."""
+        """Pull the cable out at the switch: the machine sees its link up, and no other host."""
         self._link("set", self.tap, "down")
 
     def put_back(self) -> None:

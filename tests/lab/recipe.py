@@ -20,7 +20,7 @@ WITHOUT = (
     *("/usr/share/doc/*", "/usr/share/man/*", "/usr/share/locale/*", "/usr/share/info/*"),
     *("/usr/share/lintian/*", "/usr/share/bug/*"),
 )
-"""What dpkg leaves out: nobody reads it there."""
+"""What dpkg leaves out: it is not needed there."""
 MODULES_WITHOUT = (
     *("drivers/gpu", "drivers/infiniband", "drivers/net/ethernet", "drivers/net/wireless"),
     *("drivers/isdn", "drivers/atm", "drivers/staging", "drivers/iio", "sound/soc", "sound/pci"),

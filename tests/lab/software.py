@@ -1,7 +1,7 @@
 """nondum itself, as a person installs it offline: wheels of this checkout in a venv at /opt/nondum.
 
 The venv is made by the machine's own Python, in its root file system before it is booted, and put
-on a disk of its own: a change of nondum does not cost a new root file system.
+on a separate disk: a change of nondum does not cost a new root file system.
 """
 
 from __future__ import annotations

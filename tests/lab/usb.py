@@ -102,7 +102,7 @@ class Usb:
         """The last free port of the controller (scenarios name the first ones); None: QEMU chooses.
 
         QEMU takes the port that has been free for longest, which may be one that a scenario names
-        later. Port 1 is left to it: when no other is free, it plugs in a hub of its own there.
+        later. Port 1 is left to it: when no other is free, it plugs in another hub there.
         """
         taken = {each.port for each in self._plugged.values()}
         return next((port for port in map(str, range(PORTS, 1, -1)) if port not in taken), None)
@@ -133,7 +133,7 @@ class Usb:
 
 
 def _backend(path: Path | None) -> dict[str, Any]:
-    """The other end of a serial line: whoever listens at a socket, or nobody."""
+    """The other end of a serial line: the program that listens at a socket, or nothing."""
     if path is None:
         return {"type": "null", "data": {}}
     address = {"type": "unix", "data": {"path": str(path)}}

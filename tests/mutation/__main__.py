@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
-from tests.campaign.rounds import Limit
+from tests.campaign.progress import Limit
 from tests.mutation import page
 from tests.mutation.guards import GUARDS, SPARED
 from tests.mutation.page import Key
@@ -78,8 +78,8 @@ def main() -> int:
             told = f"All of them took {minutes} minutes on {len(made)} processors."
             _write(every, guards, told)
     if tried:
-        sys.stdout.write(f"{tried.counter} tried, {len(tried.counter.failed)} without a guard\n")
-        return 1 if tried.counter.failed or broken else 0
+        sys.stdout.write(f"{tried.progress} tried, {len(tried.progress.failed)} without a guard\n")
+        return 1 if tried.progress.failed or broken else 0
     missing = [key for key in due if guards.get(key, page.MISSING) == page.MISSING]
     sys.stdout.write(f"{len(steps)} steps, {len(due)} tried, {len(missing)} without a guard\n")
     return 1 if missing or broken else 0

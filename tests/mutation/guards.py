@@ -40,8 +40,8 @@ _ADMISSION = tuple(f"{_TT}/peers/test_{each}.py" for each in ("gate", "admission
 _PEER_KEYS = (f"{_TT}/peers/test_keys.py",)
 _PAIRING = tuple(f"{_TT}/peers/test_{each}.py" for each in ("pairing", "pairing_channel"))
 _TC, _TI = "tests/sandbox", f"{_TH}/sandbox/inside"
-_IN_ROOMS = tuple(
-    f"{_TC}/test_{each}.py" for each in ("keeper", "mounts", "users", "lending", "room")
+_IN_SANDBOXES = tuple(
+    f"{_TC}/test_{each}.py" for each in ("init", "mounts", "users", "lending", "sandbox")
 )
 _PEER_CALLS = tuple(
     f"{_TT}/peers/test_{each}.py" for each in ("calls", "call_history", "allowance")
@@ -148,35 +148,35 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     # How they are confined.
     f"{_H}/workers/confinement_choice.py": ("tests/sandbox/test_level.py",),
     f"{_H}/config/confinement_level.py": ("tests/sandbox/test_level.py",),
-    f"{_H}/sandbox/levels/bubblewrap.py": (f"{_TC}/test_room_command.py", *_IN_ROOMS),
-    f"{_H}/sandbox/levels/landlock.py": (f"{_TC}/test_landlock.py", f"{_TC}/test_room.py"),
+    f"{_H}/sandbox/levels/bubblewrap.py": (f"{_TC}/test_bubblewrap_command.py", *_IN_SANDBOXES),
+    f"{_H}/sandbox/levels/landlock.py": (f"{_TC}/test_landlock.py", f"{_TC}/test_sandbox.py"),
     f"{_H}/sandbox/levels/host_children.py": (f"{_TC}/test_own_children.py",),
     f"{_H}/sandbox/levels/refusals.py": (
         *("tests/sandbox/test_refused_calls.py", "tests/sandbox/test_filters.py"),
     ),
     f"{_H}/sandbox/inside/bootstrap.py": (
         f"{_TI}/test_bootstrap.py",
-        *_IN_ROOMS,
+        *_IN_SANDBOXES,
         *(f"{_TH}/workers/test_{each}.py" for each in ("spare", "host_death")),
     ),
     f"{_H}/workers/spare.py": (f"{_TH}/workers/test_spare.py",),
     f"{_H}/sandbox/inside/init.py": (
-        *(f"{_TC}/test_service.py", *_IN_ROOMS, f"{_TH}/workers/test_host_death.py"),
+        *(f"{_TC}/test_service.py", *_IN_SANDBOXES, f"{_TH}/workers/test_host_death.py"),
     ),
     f"{_H}/sandbox/inside/kernel.py": (
         *(f"{_TI}/test_{each}.py" for each in ("kernel", "restrict")),
-        *(f"{_TH}/sandbox/helper/test_worker_users.py", f"{_TC}/test_service.py", *_IN_ROOMS),
+        *(f"{_TH}/sandbox/helper/test_worker_users.py", f"{_TC}/test_service.py", *_IN_SANDBOXES),
     ),
     f"{_H}/sandbox/inside/limits.py": (f"{_TI}/test_limits.py",),
     f"{_H}/sandbox/inside/inspect_self.py": (
-        *(f"{_TI}/test_inspect_self.py", f"{_TC}/test_level.py", f"{_TC}/test_keeper.py"),
+        *(f"{_TI}/test_inspect_self.py", f"{_TC}/test_level.py", f"{_TC}/test_init.py"),
     ),
     f"{_H}/sandbox/inside/mounts.py": (
         f"{_TC}/test_service.py",
-        *_IN_ROOMS[1:],
+        *_IN_SANDBOXES[1:],
         f"{_TH}/workers/test_devices.py",
-        f"{_TC}/test_restrict.py::test_wall_of_a_room_matters[user namespaces]",
-        f"{_TC}/test_restrict.py::test_nothing_of_that_is_possible_in_a_whole_room",
+        f"{_TC}/test_restrictions.py::test_restriction_of_a_sandbox_matters[user namespaces]",
+        f"{_TC}/test_restrictions.py::test_nothing_of_that_is_possible_in_a_whole_sandbox",
     ),
     f"{_H}/sandbox/inside/restrict.py": (f"{_TI}/test_restrict.py",),
     f"{_H}/sandbox/helper/requests.py": (f"{_TH}/sandbox/helper/test_requests.py",),
@@ -275,7 +275,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
 }
 """Module → tests. What is plugged in, from its signature to its last frame."""
 
-ROOMS = (
+FOLDERS = (
     _W,
     f"{_H}/trust",
     f"{_H}/sources/drives",
@@ -347,9 +347,9 @@ ASIDE: Mapping[str, str] = {
     f"{_T}/peers/incoming_calls.py": "answers with what work of this host's own has failed by",
     f"{_T}/peers/socket_process/service.py": "does what its own daemon says",
     f"{_T}/peers/routes.py": "tells why a peer is not reached",
-    f"{_H}/peers/name_conflicts.py": "says what people are told; `roster` refuses",
+    f"{_H}/peers/name_conflicts.py": "says what people are told; `peer_table` refuses",
     f"{_T}/peers/pairing_problems.py": "says what people are told; `pairing_channel` refuses",
-    f"{_H}/peers/finder.py": "hands on the addresses that the mesh takes",
+    f"{_H}/peers/finder.py": "passes on the addresses that the mesh takes",
     f"{_H}/peers/peering.py": "says that a peer is not there",
     f"{_H}/peers/trust_orders.py": "asks a person of this host which peer is meant",
     f"{_H}/peers/placement/handover.py": _WHOLE,

@@ -3,7 +3,7 @@
 Refusing is raising, telling a problem, or returning what is wrong. A step is what leads to it:
 
 - the condition of an `if`, or the guard of a `case`, whose body does nothing but refuse; of
-  `a or b` each is a step of its own, and of `not (a and b)` and `not 0 < a <= 9`, too;
+  `a or b` each is a separate step, and of `not (a and b)` and `not 0 < a <= 9`, too;
 - the condition that must hold if the refusal that follows, or stands in `else`, is not to come;
 - a `case` or `except` that does nothing but refuse, and the loop that finds what to tell;
 - the call by which the flaws that another function finds are told with the others;
@@ -225,7 +225,7 @@ class _Finder:
                             yield from _necessities(test)
 
     def _refuses(self, body: Sequence[ast.stmt]) -> bool:
-        """Whether a body does nothing but refuse, in words of its own."""
+        """Whether a body does nothing but refuse; other statements may put its words together."""
         others = (ast.Assign, ast.Expr, ast.Continue, ast.Break, ast.Return)
         refusals = [self._is_refusal(one) for one in body]
         return any(refusals) and all(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.mutation import page
-from tests.mutation.guards import ASIDE, GUARDS, ROOMS, SPARED
+from tests.mutation.guards import ASIDE, FOLDERS, GUARDS, SPARED
 from tests.mutation.page import Key
 from tests.mutation.steps import TABLES, steps_in, steps_of
 
@@ -30,9 +30,9 @@ def test_the_page_has_every_step_and_a_test_that_guards_it() -> None:
         assert f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), guard
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_no_module_that_refuses_anything_is_left_out(room: str) -> None:
-    for path in sorted((ROOT / room).rglob("*.py")):
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_no_module_that_refuses_anything_is_left_out(folder: str) -> None:
+    for path in sorted((ROOT / folder).rglob("*.py")):
         module = path.relative_to(ROOT).as_posix()
         if "template" not in path.parts:
             refuses = bool(steps_of(module, path.read_text(encoding="utf-8")))

@@ -41,17 +41,17 @@ def test_step_is_due_until_it_is_tried(root: Path) -> None:
 def test_module_of_guarded_steps_is_due_on_no_machine(root: Path) -> None:
     for step in STEPS:
         tried_on("one", root).add(step, GUARD)
-    counter = tried_on("two", root).counter
-    assert counter.is_whole
-    assert not counter.failed
+    progress = tried_on("two", root).progress
+    assert progress.is_whole
+    assert not progress.failed
 
 
 def test_step_without_a_guard_fails_here_and_is_tried_elsewhere(root: Path) -> None:
     tried = tried_on("one", root)
     tried.add(STEPS[0], GUARD)
     tried.add(STEPS[1], "")
-    assert [name.partition(": ")[2] for name in tried.counter.failed] == ["b (1)"]
-    assert not tried_on("two", root).counter.done
+    assert [name.partition(": ")[2] for name in tried.progress.failed] == ["b (1)"]
+    assert not tried_on("two", root).progress.done
 
 
 @pytest.mark.parametrize("changed", [MODULE, GUARDS[MODULE][0]])
@@ -60,7 +60,7 @@ def test_all_steps_are_due_once_something_has_changed(root: Path, changed: str) 
         tried_on("one", root).add(step, GUARD)
     (root / changed).write_text("2", encoding="utf-8")
     for machine in ("one", "two"):
-        assert not tried_on(machine, root).counter.done
+        assert not tried_on(machine, root).progress.done
 
 
 def test_all_steps_are_due_once_another_test_of_the_same_file_is_a_guard(

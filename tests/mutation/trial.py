@@ -15,7 +15,7 @@ from typing import Self
 from tests.mutation.runner import UNTOLD
 from tests.mutation.steps import Step
 
-_ROOMS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
+_PORTIONS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
 
 
 def copies(root: Path, folder: Path, count: int) -> list[Copy]:
@@ -38,7 +38,7 @@ class Copy:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._moments = itertools.count(1_000_000_000, 10)
-        paths = os.pathsep.join(str(folder / room) for room in _ROOMS)
+        paths = os.pathsep.join(str(folder / portion) for portion in _PORTIONS)
         self._runner = subprocess.Popen(
             ["nice", "-n", "5", sys.executable, "-m", "tests.mutation.runner"],
             cwd=folder,
@@ -77,7 +77,7 @@ class Copy:
             self._write(file, whole)
 
     def _write(self, file: Path, text: str) -> None:
-        """With a time of its own: byte code is told from another by time and size."""
+        """With a time that no version had before: Python recognises byte code by time and size."""
         file.write_text(text, encoding="utf-8")
         moment = next(self._moments)
         os.utime(file, (moment, moment))

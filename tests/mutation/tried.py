@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from tests.campaign.rounds import Rounds
+from tests.campaign.progress import Progress
 from tests.mutation.guards import GUARDS
 from tests.mutation.page import Key
 
@@ -33,7 +33,7 @@ class Tried:
         self._hashes = {module: _hash(root, module) for module in {k.module for k in self._steps}}
         self._found: dict[str, list[str]] = _read(self._file)
         self._guarded_file, self._guarded = guarded, _read(guarded)
-        self.counter.write(folder)
+        self.progress.write(folder)
 
     def is_due(self, key: Key) -> bool:
         """Whether it was not tried with the text that is there now."""
@@ -50,14 +50,14 @@ class Tried:
             self._guarded[key.module] = self._hashes[key.module]
             known = {name: self._guarded[name] for name in sorted(self._guarded.keys() & GUARDS)}
             self._guarded_file.write_text(json.dumps(known, indent=1) + "\n")
-        self.counter.write(self._folder)
+        self.progress.write(self._folder)
 
     @property
-    def counter(self) -> Rounds:
+    def progress(self) -> Progress:
         """Of all steps that there are."""
         done = [key for key in self._steps if not self.is_due(key)]
         failed = [_name(key) for key in done if not self._is_guarded(key)]
-        return Rounds(len(self._steps), tuple(map(_name, done)), tuple(failed))
+        return Progress(len(self._steps), tuple(map(_name, done)), tuple(failed))
 
     def _is_guarded(self, key: Key) -> bool:
         """Whether a guard was found with the text that is there now."""

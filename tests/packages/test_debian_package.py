@@ -163,7 +163,7 @@ def test_command_of_the_tree_runs_wherever_it_lies(tree: Tree) -> None:
 
 
 @long
-def test_same_bytes_whoever_builds_it(package: Package, build: Build, tmp_path: Path) -> None:
+def test_every_build_makes_the_same_bytes(package: Package, build: Build, tmp_path: Path) -> None:
     words = ("--arch", "arm64", "--version", "0.1.0+test1")
     checkout = copied(tmp_path / "some where/else", umask=0o077, time_s=1_700_000_000)
     theirs = {"TZ": "Asia/Tokyo", "LC_ALL": "C", "HOME": "/nonexistent"}

@@ -35,7 +35,7 @@ def test_all_that_is_asked_for_is_locked(python: str, machine: str) -> None:
             assert pinned[name] in requirement.specifier, f"{requirement}: run `./run lock`"
 
 
-def test_nothing_is_locked_that_nobody_asks_for() -> None:
+def test_nothing_is_locked_that_is_not_needed() -> None:
     needed = lockfile.needed(ENTRIES, map(asked.name_of, ASKED))
     assert {entry.name for entry in ENTRIES} <= needed, "run `./run lock`"
 

@@ -100,7 +100,7 @@ def _is_active(view: dict[str, Any]) -> bool:
 
 
 def _tool(name: str, folder: Path, clean: dict[str, str]) -> Path:
-    """A tool from PyPI, in a venv of its own."""
+    """A tool from PyPI, in a new venv."""
     venv.create(folder, with_pip=True)
     subprocess.run([folder / "bin/pip", "install", "-q", name], env=clean, check=True)
     return folder / "bin" / name

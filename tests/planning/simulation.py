@@ -10,6 +10,7 @@ from tests.planning.tasks import search
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.execute.running import RunState
+from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.planning.execute.world import WorldModel
@@ -225,13 +226,14 @@ def task_tree(
     after: TaskTree | None = None,
     exclusive: frozenset[str] = frozenset({"base", "ptu"}),
     patience: Patience | None = None,
+    leaves: RunningLeaves | None = None,
 ) -> TaskTree:
     """The tree of a plan on this robot."""
     return TaskTree(
         robot.task,
         plan,
         lasting=robot.lasting,
-        runner=robot,
+        leaves=RunningLeaves(robot, lambda: robot.now_s) if leaves is None else leaves,
         kind=kind,
         sight=lambda: (robot.world, robot.now_s),
         exclusive=exclusive,

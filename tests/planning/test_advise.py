@@ -101,7 +101,7 @@ def test_whole_robot_is_put_together_from_a_shelf() -> None:
     assert sets(ask(here(), FOLLOW)) == {frozenset({camera, *others}) for camera in cameras}
 
 
-def test_only_what_concerns_the_goal_is_looked_at() -> None:
+def test_only_what_the_goal_depends_on_is_looked_at() -> None:
     assert ask(here(), POINT).looked_at == 2
 
 
@@ -197,7 +197,7 @@ def test_payload_that_contradicts_what_is_here_is_unfit_and_says_why() -> None:
     assert sets(advice) == {frozenset({"good"})}
     [unfit] = advice.unfit
     assert unfit.id == "odd"
-    assert unfit.caveats[0].code.startswith("E-PRED")
+    assert unfit.caveats[0].code in ("PDDL_ARITY", "PDDL_SIGNATURE")
 
 
 def test_rest_of_a_payload_helps_though_a_part_of_it_is_kept_out() -> None:
@@ -205,7 +205,7 @@ def test_rest_of_a_payload_helps_though_a_part_of_it_is_kept_out() -> None:
     [way] = ask(followers(), FOLLOW, [payload("pack", odd, component(RECORDED_CAMERA))]).ways
     [used] = way.payloads
     assert [c.component for c in used.contributions] == ["recorded-camera"]
-    assert used.caveats[0].code.startswith("E-PRED")
+    assert used.caveats[0].code in ("PDDL_ARITY", "PDDL_SIGNATURE")
 
 
 def test_payload_of_which_all_is_here_in_another_release_is_not_told_of() -> None:

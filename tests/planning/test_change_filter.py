@@ -10,7 +10,7 @@ from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, follow_task, plan_
 
 from nondum.planning.execute.change_filter import ChangeFilter
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.task_tree import StepLeaf, TaskTree
+from nondum.planning.execute.task_tree import TaskTree
 
 
 def holding() -> tuple[Robot, TaskTree]:
@@ -63,7 +63,7 @@ def life(seed: int) -> list[tuple[Phase, list[str], list[str]]]:
     seen = []
     for moment in range(150):
         tree.tick_once()
-        whys = [leaf.why() for leaf in tree.children if isinstance(leaf, StepLeaf)]
+        whys = [leaf.why() for leaf in tree.steps]
         seen.append((tree.control.phase, list(tree.control.runs), whys))
         robot.world.know(f"noise-{moment}", "roof", robot.now_s)
         robot.moment()

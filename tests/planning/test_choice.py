@@ -13,7 +13,7 @@ from nondum.sdk.planner import GroundTask
 
 
 def kind(name: str) -> str:
-    """Streams of one kind end alike; everything else is of its own kind."""
+    """Streams of one kind end alike; everything else is a separate kind."""
     return name.rpartition("-")[2]
 
 

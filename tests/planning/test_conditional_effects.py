@@ -32,7 +32,7 @@ def plan_of(task: GroundTask) -> Plan:
     return answer if isinstance(answer, Plan) else Plan((), 0)
 
 
-def test_step_that_deletes_a_fact_makes_room_for_what_needs_it_false() -> None:
+def test_step_that_deletes_a_fact_enables_what_needs_it_false() -> None:
     """The last action's conditional effect would undo what it adds, were `a` still true."""
     harm = ConditionalEffect(frozenset({0}), frozenset(), frozenset({2}))
     task = GroundTask(

@@ -129,7 +129,7 @@ def test_each_plugin_is_needed(missing: PluginDescription, goal: str) -> None:
 
 
 def test_goal_about_an_unknown_object_is_refused() -> None:
-    with pytest.raises(GoalRefused, match="nobody declares 'radiation-source'"):
+    with pytest.raises(GoalRefused, match="'radiation-source' is not declared"):
         task(components([PAN_TILT_UNIT]), POINT)
 
 

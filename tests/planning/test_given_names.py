@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.sandbox.cgroups.limits import NAME as CAGE
+from nondum.host.sandbox.cgroups.limits import NAME as CGROUP
 from nondum.host.sandbox.helper.requests import COMPONENT
 from nondum.planning.merge.given_names import (
     LONGEST,
@@ -17,7 +17,7 @@ from nondum.planning.merge.given_names import (
     forms,
     of_components,
     of_plugin,
-    plugins_of_others,
+    plugins_of_other_payloads,
 )
 from nondum.planning.pddl.parse import parse_formula
 from nondum.sdk.description import Fragment
@@ -65,7 +65,7 @@ def test_every_form_is_a_name_wherever_components_are_named(id: str, payload: st
     for name in islice(forms(id, payload), 20):
         assert len(name) <= LONGEST
         assert COMPONENT.fullmatch(name)
-        assert CAGE.fullmatch(f"{name}.1")
+        assert CGROUP.fullmatch(f"{name}.1")
         assert "_" not in name  # objects are `host__component__unit`
         assert parse_formula(f"(ready rover__{name}__unit)", "goal")
 
@@ -82,7 +82,7 @@ def test_the_id_of_the_payload_can_be_read_in_a_name() -> None:
     assert named == {"gps": "gps--org-example-north"}
 
 
-def test_payloads_whose_ids_differ_in_a_dot_only_have_two_names() -> None:
+def test_payloads_with_ids_that_differ_in_a_dot_only_have_two_names() -> None:
     first = of_components("org.a.b", ["gps"], {}, {"gps"})["gps"]
     second = of_components("org.a-b", ["gps"], {}, {"gps", first})["gps"]
     assert second.startswith(f"{first}--")
@@ -122,12 +122,12 @@ def test_a_plugin_keeps_the_name_that_it_had() -> None:
 def test_a_name_that_was_given_stays_its_payload_s_while_that_is_away() -> None:
     """Two payload ids may make one name."""
     away = {"org.a-b": GivenNames(plugins={"gps": "gps--org-a-b", "clock": "clock"})}
-    given = plugins_of_others(away, "org.a.b")
+    given = plugins_of_other_payloads(away, "org.a.b")
     name = of_plugin("gps", "org.a.b", [A], None, {"gps": [B]}, given)
     assert name not in ("gps", "gps--org-a-b")
     assert of_plugin("clock", "org.a.b", [A], None, {}, given) == "clock"
     assert of_plugin("gps", "org.a-b", [A], "gps--org-a-b", {"gps": [B]}, given) == "gps--org-a-b"
-    assert plugins_of_others(away, "org.a-b") == frozenset()
+    assert plugins_of_other_payloads(away, "org.a-b") == frozenset()
 
 
 def test_a_plugin_gives_up_a_name_that_means_something_else_meanwhile() -> None:

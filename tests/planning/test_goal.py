@@ -25,14 +25,18 @@ def test_goal_may_be_a_conjunction() -> None:
 
 
 WRONG = {
-    "syntax": ("(pointing self", "E-SYNTAX", "expected"),
-    "predicate": ("(point self radiation-source)", "E-UNDECL", "did you mean 'pointing'?"),
-    "object": ("(pointing self radiation-sauce)", "E-UNDECL", "did you mean 'radiation-source'?"),
-    "type": ("(pointing radiation-source self)", "E-TYPE", "expected host"),
-    "arity": ("(pointing self)", "E-PRED-ARITY", "(pointing self) has 1 arguments"),
-    "disjunction": ("(or (pointing self radiation-source) (ready x))", "E-UNDECL", "'x'"),
-    "number": ("(> (dose self) 3)", "E-UNSUPPORTED", "the numeric condition (> (dose self) 3)"),
-    "variable": ("(pointing self ?x)", "E-UNDECL", "?x is not a parameter"),
+    "syntax": ("(pointing self", "PDDL_SYNTAX", "expected"),
+    "predicate": ("(point self radiation-source)", "PDDL_UNKNOWN", "did you mean 'pointing'?"),
+    "object": (
+        "(pointing self radiation-sauce)",
+        "PDDL_UNKNOWN",
+        "did you mean 'radiation-source'?",
+    ),
+    "type": ("(pointing radiation-source self)", "PDDL_TYPE", "expected host"),
+    "arity": ("(pointing self)", "PDDL_ARITY", "(pointing self) has 1 arguments"),
+    "disjunction": ("(or (pointing self radiation-source) (ready x))", "PDDL_UNKNOWN", "'x'"),
+    "number": ("(> (dose self) 3)", "PDDL_UNSUPPORTED", "the numeric condition (> (dose self) 3)"),
+    "variable": ("(pointing self ?x)", "PDDL_UNKNOWN", "?x is not a parameter"),
 }
 
 
@@ -47,8 +51,8 @@ def test_wrong_goal_is_refused_with_a_caret(text: str, code: str, message: str) 
     assert text in problem.message
 
 
-def test_goal_whose_object_has_gone_is_told() -> None:
+def test_goal_about_an_object_that_has_gone_is_told() -> None:
     goal = parse_goal("(pointing self radiation-source)", BOTH)
     assert not goal_problems(goal, BOTH)
     left = merge(components([PAN_TILT_UNIT]), ROVER)
-    assert [problem.code for problem in goal_problems(goal, left)] == ["E-UNDECL"]
+    assert [problem.code for problem in goal_problems(goal, left)] == ["PDDL_UNKNOWN"]

@@ -92,7 +92,7 @@ def test_unit_that_serves_one_behaviour_at_a_time_is_not_shared() -> None:
     assert not reserved("lift", ()).conflict(reserved("turn", ()))
 
 
-def test_narrowed_task_has_only_actions_that_may_be_under_way_beside_others() -> None:
+def test_narrowed_task_has_only_actions_that_may_be_under_way_beside_the_reserved_ones() -> None:
     led = f"{ROVER}__beacon__led"
     ground = task(components((BEACON, LAMP)), f"(and (lit {led}) (lit {ROVER}__lamp__led))")
     flash = reservation("(reported person self)", "beacon", "flash")

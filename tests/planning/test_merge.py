@@ -38,209 +38,209 @@ def refused(*contributions: Contribution) -> Problem:
 ALONE = {
     "undeclared type": (
         "(:constants a - rom)",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "a - rom",
-        "nobody declares type 'rom'",
+        "type 'rom' is not declared",
     ),
     "undeclared predicate": (
         "(:action go :parameters (?u - base) :precondition (redy ?u))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "redy",
-        "nobody declares predicate 'redy'",
+        "predicate 'redy' is not declared",
     ),
     "unbound variable": (
         "(:action go :parameters (?u - base) :precondition (ready ?v))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "?v",
         "?v is not a parameter",
     ),
     "undeclared object": (
         "(:action go :parameters (?u - base) :precondition (recognises ?u goose))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "goose",
-        "nobody declares 'goose'",
+        "'goose' is not declared",
     ),
     "wrong arity": (
         "(:action go :parameters (?u - base) :precondition (on ?u))",
-        "E-PRED-ARITY",
+        "PDDL_ARITY",
         "on ?u",
         "(on ?u) has 1 arguments, (on ?1 - unit ?2 - host) is declared",
     ),
     "wrong type": (
         "(:action go :parameters (?u - base) :precondition (flowing ?u))",
-        "E-TYPE",
+        "PDDL_TYPE",
         "?u))",
         "expected stream, ?u is base",
     ),
     "no actor": (
         "(:action go :parameters (?h - host))",
-        "E-ACTOR",
+        "PDDL_ACTOR",
         "?h - host",
         "the first parameter of 'go' is not a unit",
     ),
-    "no parameters": ("(:action go)", "E-ACTOR", "go)", "is not a unit"),
+    "no parameters": ("(:action go)", "PDDL_ACTOR", "go)", "is not a unit"),
     "writes a host's word": (
         "(:action go :parameters (?u - base) :effect (ready ?u))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "ready",
         "'ready' is the host's to say",
     ),
     "gives back by itself": (
         "(:action go :parameters (?u - base) :effect (idle ?u))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "idle",
         "'idle' is the host's to say",
     ),
     "deletes readiness": (
         "(:action go :parameters (?u - base) :effect (not (ready ?u)))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "ready",
         "'ready' is the host's to say",
     ),
     "names self in an action": (
         "(:action go :parameters (?u - base) :precondition (on ?u self))",
-        "E-INSTANCE",
+        "PDDL_INSTANCE",
         "self",
         "'self' names one instance",
     ),
     "names its own unit in an action": (
         "(:action go :parameters (?u - base) :precondition (ready wheels))",
-        "E-INSTANCE",
+        "PDDL_INSTANCE",
         "wheels",
         "'wheels' names one instance",
     ),
     "unknown word in a disjunction": (
         "(:action go :parameters (?u - base) :precondition (or (ready ?u) (idel ?u)))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "idel",
-        "nobody declares predicate 'idel'",
+        "predicate 'idel' is not declared",
     ),
     "unknown type of a quantified variable": (
         "(:action go :parameters (?u - base) :precondition (forall (?x - unti) (idle ?x)))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "?x",
-        "nobody declares type 'unti'",
+        "type 'unti' is not declared",
     ),
     "variable outside its quantifier": (
         "(:action go :parameters (?u - base) :precondition"
         " (and (exists (?x - unit) (idle ?x)) (ready ?x)))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "?x",
         "?x is not a parameter",
     ),
     "host's word under a condition": (
         "(:action go :parameters (?u - base) :effect (when (idle ?u) (ready ?u)))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "ready",
         "'ready' is the host's to say",
     ),
     "cost under a condition": (
         "(:action go :parameters (?u - base) :effect (when (ready ?u) (increase (total-cost) 1)))",
-        "E-UNSUPPORTED",
+        "PDDL_UNSUPPORTED",
         "increase",
         "a cost that depends on a condition",
     ),
     "rule for the host's word": (
         "(:derived (ready ?u - unit) (idle ?u))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "ready",
         "'ready' is the host's to say",
     ),
     "rule and action for one word": (
         "(:predicates (up ?u - unit)) (:derived (up ?v - unit) (idle ?v))"
         " (:action go :parameters (?u - base) :effect (up ?u))",
-        "E-DERIVED",
+        "PDDL_DERIVED",
         "up ?v",
         "'up' follows from rules in one place and is written in another",
     ),
     "word that holds if it does not": (
         "(:predicates (up ?u - unit)) (:derived (up ?v - unit) (not (up ?v)))",
-        "E-DERIVED",
+        "PDDL_DERIVED",
         "up ?v",
         "these hold only if they do not: up",
     ),
-    "function that nobody declares": (
+    "undeclared function": (
         "(:action go :parameters (?u - base) :effect (increase (total-cost) (weight ?u)))",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "weight",
-        "nobody declares function 'weight'",
+        "function 'weight' is not declared",
     ),
     "numeric effect": (
         "(:action go :parameters (?u - base) :effect (decrease (fuel) 1))",
-        "E-UNSUPPORTED",
+        "PDDL_UNSUPPORTED",
         "decrease",
         "numeric effect (decrease (fuel) 1)",
     ),
     "effect as condition": (
         "(:predicates (up)) (:action go :parameters (?u - base) :precondition (when (up) (up)))",
-        "E-MISPLACED",
+        "PDDL_MISPLACED",
         "when",
         "'when' belongs in an effect",
     ),
     "condition as effect": (
         "(:predicates (up)) (:action go :parameters (?u - base) :effect (or (up) (up)))",
-        "E-MISPLACED",
+        "PDDL_MISPLACED",
         "or",
         "'or' is not an effect",
     ),
     "action twice": (
         "(:action go :parameters (?u - base)) (:action go :parameters (?u - base))",
-        "E-TWICE",
+        "PDDL_TWICE",
         "go :parameters (?u - base)))",
         "action 'go' is declared twice",
     ),
     "circle of types": (
         "(:types a - b b - a)",
-        "E-TYPE-CYCLE",
+        "PDDL_TYPE_CYCLE",
         "a - b",
         "types in a circle: a - b, b - a",
     ),
-    "parent of object": ("(:types object - x)", "E-TYPE-CYCLE", "object", "above all"),
+    "parent of object": ("(:types object - x)", "PDDL_TYPE_CYCLE", "object", "above all"),
     "core type elsewhere": (
         "(:types camera - sensor)",
-        "E-TYPE-PARENT",
+        "PDDL_TYPE_PARENT",
         "camera",
         "in the core, 'camera' is a kind of unit",
     ),
     "core predicate otherwise": (
         "(:predicates (ready ?u ?v))",
-        "E-PRED-ARITY",
+        "PDDL_ARITY",
         "ready",
         "predicate 'ready': 2 arguments, 1 as nondum-core",
     ),
     "core predicate of another type": (
         "(:predicates (ready ?u - place))",
-        "E-PRED-TYPE",
+        "PDDL_SIGNATURE",
         "ready",
         "argument 1: place, unit as nondum-core",
     ),
     "value of nothing": (
         "(:valued dose)",
-        "E-UNDECL",
+        "PDDL_UNKNOWN",
         "dose",
         "'dose' in :valued is no predicate",
     ),
     "value of no message type": (
         "(:predicates (seen ?h - host)) (:valued seen - pos)",
-        "E-TYPE",
+        "PDDL_TYPE",
         "seen",
         "the value of 'seen' is of no message type: pos",
     ),
     "value of two types": (
         "(:predicates (seen ?h - host)) (:valued seen - (either pose twist))",
-        "E-TYPE",
+        "PDDL_TYPE",
         "seen",
         "of no message type: (either pose twist)",
     ),
     "object of another component": (
         "(:constants rover__camera__lens - camera)",
-        "E-OWNED",
+        "PDDL_OWNED",
         "rover__",
         "has the form of another component's unit",
     ),
     "own unit of another type": (
         "(:constants wheels - camera)",
-        "E-OBJ-TYPE",
+        "PDDL_OBJECT_TYPE",
         "wheels",
         "'wheels' is base, not camera",
     ),
@@ -261,19 +261,19 @@ def test_wrong_fragment_keeps_its_component_out(
 
 
 INITS = {
-    "host's word": ("(:init (ready wheels))", "E-OWNED", "'ready' is the host's to say"),
-    "no fact": ("(:init (not (found goose self)))", "E-INIT", "is not a fact"),
-    "half a number": ("(:init (= (weight wheels) 1.5))", "E-INIT", "only whole numbers"),
-    "number of nothing": ("(:init (= wheels 1))", "E-INIT", "gives no function a number"),
-    "unknown function": ("(:init (= (wait wheels) 1))", "E-UNDECL", "function 'wait'"),
-    "wrong type": ("(:init (found self self))", "E-TYPE", "expected class, self is host"),
-    "variable": ("(:init (recognises ?u person))", "E-UNDECL", "?u is not a parameter"),
+    "host's word": ("(:init (ready wheels))", "PDDL_OWNED", "'ready' is the host's to say"),
+    "no fact": ("(:init (not (found goose self)))", "PDDL_INIT", "is not a fact"),
+    "half a number": ("(:init (= (weight wheels) 1.5))", "PDDL_INIT", "only whole numbers"),
+    "number of nothing": ("(:init (= wheels 1))", "PDDL_INIT", "gives no function a number"),
+    "unknown function": ("(:init (= (wait wheels) 1))", "PDDL_UNKNOWN", "function 'wait'"),
+    "wrong type": ("(:init (found self self))", "PDDL_TYPE", "expected class, self is host"),
+    "variable": ("(:init (recognises ?u person))", "PDDL_UNKNOWN", "?u is not a parameter"),
     "stranger's unit": (
         "(:init (recognises rover__detector__hog goose))",
-        "E-OWNED",
+        "PDDL_OWNED",
         "another component's unit",
     ),
-    "goal": ("(:goal (ready wheels))", "E-GOAL", "a fragment has no goal"),
+    "goal": ("(:goal (ready wheels))", "PDDL_GOAL", "a fragment has no goal"),
 }
 
 
@@ -289,7 +289,7 @@ def test_lasting_behaviour_has_no_effects_under_conditions() -> None:
               :effect (and (not (idle ?u)) (when (ready ?u) (up))))"""
     behaviour = Behaviour("go", "(go ?u - base)", lasting=True)
     found = refused(brings("drive", body, units={"wheels": "base"}, behaviours=(behaviour,)))
-    assert found.code == "E-UNSUPPORTED"
+    assert found.code == "PDDL_UNSUPPORTED"
     assert "'go' is lasting, and has effects under conditions" in found.message
 
 
@@ -298,7 +298,7 @@ def test_stranger_may_not_write_what_follows_from_another_ones_rules() -> None:
     writer = "(:predicates (up ?u - unit)) (:action go :parameters (?u - base) :effect (up ?u))"
     result = merge([brings("arm", rule), brings("base", writer)], HOST)
     [problem] = result.quarantined["base"]
-    assert problem.code == "E-DERIVED"
+    assert problem.code == "PDDL_DERIVED"
     assert problem.where.startswith("base 1.0 domain.pddl:1:")
     assert "arm 1.0 domain.pddl:1:" in problem.message
 
@@ -310,7 +310,7 @@ def test_circle_through_two_strangers_rules_keeps_the_later_one_out() -> None:
     assert merge([first], HOST).quarantined == {}
     result = merge([second, first], HOST)
     [problem] = result.quarantined["base"]
-    assert problem.code == "E-DERIVED"
+    assert problem.code == "PDDL_DERIVED"
     assert "these hold only if they do not: down, up" in problem.message
 
 
@@ -378,7 +378,7 @@ def test_lasting_behaviour_may_take_its_unit() -> None:
 
 def test_finishing_behaviour_may_not_take_anything() -> None:
     found = refused(brings("drive", GO, behaviours=(Behaviour("go", "(go ?u - base)"),)))
-    assert found.code == "E-OWNED"
+    assert found.code == "PDDL_OWNED"
     assert "only a lasting behaviour may take (idle ?u)" in found.message
 
 
@@ -409,37 +409,37 @@ CONFLICTS = {
     "arity": (
         "(:predicates (at ?u - base ?p - place))",
         "(:predicates (at ?u - base))",
-        "E-PRED-ARITY",
+        "PDDL_ARITY",
         "predicate 'at': 1 arguments here, 2 in a 1.0 domain.pddl:1:34",
     ),
     "predicate types": (
         "(:predicates (at ?u - base))",
         "(:predicates (at ?u - place))",
-        "E-PRED-TYPE",
+        "PDDL_SIGNATURE",
         "argument 1: place here, base in a 1.0",
     ),
     "types of values": (
         "(:predicates (seen ?h - host)) (:valued seen - pose)",
         "(:predicates (seen ?h - host)) (:valued seen - gps-fix)",
-        "E-PRED-TYPE",
+        "PDDL_SIGNATURE",
         "predicate 'seen': its value is a gps-fix here, a pose in a 1.0",
     ),
     "parents": (
         "(:types rotor - base)",
         "(:types rotor - arm)",
-        "E-TYPE-PARENT",
+        "PDDL_TYPE_PARENT",
         "type 'rotor' is a kind of arm here, of base in a 1.0",
     ),
     "circle": (
         "(:types x - y y)",
         "(:types y - x x)",
-        "E-TYPE-CYCLE",
+        "PDDL_TYPE_CYCLE",
         "x - y, y - x",
     ),
     "object types": (
         "(:constants goose - class)",
         "(:constants goose - target)",
-        "E-OBJ-TYPE",
+        "PDDL_OBJECT_TYPE",
         "'goose' is target here, class in a 1.0",
     ),
 }
@@ -522,7 +522,7 @@ def test_two_versions_with_other_schemas_conflict() -> None:
     found = refused(
         brings("drive", GO, component="a"), brings("drive", other, component="b", version="2.0")
     )
-    assert found.code == "E-VERSION"
+    assert found.code == "PDDL_VERSION"
 
 
 def test_two_versions_with_one_schema_share_it() -> None:

@@ -100,7 +100,7 @@ def test_retraction_is_exact(given: list[Contribution]) -> None:
 
 @given(contributions())
 def test_unrelated_component_keeps_its_meaning(given: list[Contribution]) -> None:
-    """A component that shares only the core's words is the same whoever else is there."""
+    """A component that shares only the core's words is the same with any other components."""
     strangers = [component(plugin, HOST, rank=9) for plugin in STRANGERS]
     alone, together = merge(strangers, HOST), merge([*strangers, *given], HOST)
     for name, action in alone.domain.actions.items():

@@ -32,7 +32,7 @@ FOLLOW = "(following self person)"
 
 
 def knobs(name: str, count: int, arguments: str, more: str = "") -> Contribution:
-    """A unit with so many knobs, which says that turning some of them makes the robot follow."""
+    """A unit with `count` knobs, which says that turning some of them makes the robot follow."""
     names = " ".join(f"{name}{number}" for number in range(count))
     body = f"""(:types {name}-knob - object) (:constants {names} - {name}-knob)
     (:action turn :parameters (?u - speaker {arguments} - {name}-knob ?h - host ?c - class)
@@ -84,7 +84,7 @@ def test_bindings_that_are_looked_at_in_vain_count_too() -> None:
 
 
 @pytest.mark.parametrize(("objects", "is_too_much"), [(10, False), (14, True)])
-def test_bindings_that_nobody_asks_for_count_too(objects: int, is_too_much: bool) -> None:
+def test_bindings_that_are_not_needed_count_too(objects: int, is_too_much: bool) -> None:
     """All but one of 1,000 or 2,744: as many as may be looked at, if making one cost nothing."""
     names = [f"o{number}" for number in range(objects)]
     domain = """(define (domain knots) (:requirements :strips)
@@ -160,14 +160,14 @@ def test_all_that_are_oversized_are_left_out() -> None:
     assert set(fit([*followers(), *both]).left_out) == {"one", "two"}
 
 
-def test_what_concerns_no_goal_does_no_harm() -> None:
+def test_what_no_goal_depends_on_does_no_harm() -> None:
     wide = knobs("wide", 30, "?x ?y ?z")
     streaming = f"(from {ROVER}__recorded-camera__frames self)"
     found = fit([wide, *components([RECORDED_CAMERA])], streaming)
     assert not found.left_out
 
 
-def test_nobody_to_leave_out_is_refused() -> None:
+def test_excess_without_a_component_to_leave_out_is_refused() -> None:
     def refuse(_: Merged) -> None:
         raise TooManyBindings(Problem("PDDL_TOO_MANY", "too many"), frozenset())
 

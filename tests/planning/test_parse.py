@@ -164,7 +164,7 @@ SYNTAX_ERRORS = {
 @pytest.mark.parametrize(("text", "place", "message"), SYNTAX_ERRORS.values(), ids=SYNTAX_ERRORS)
 def test_syntax_error_names_place_and_expectation(text: str, place: str, message: str) -> None:
     problem = refused(text)
-    assert problem.code == "E-SYNTAX"
+    assert problem.code == "PDDL_SYNTAX"
     assert problem.where == f"d.pddl:{place}"
     assert message in problem.message
 
@@ -215,7 +215,7 @@ def test_nearest_keyword_is_suggested() -> None:
 )
 def test_what_is_not_handled_is_named(text: str, message: str) -> None:
     problem = refused(text)
-    assert problem.code == "E-UNSUPPORTED"
+    assert problem.code == "PDDL_UNSUPPORTED"
     assert problem.message.startswith(message)
 
 
@@ -228,7 +228,7 @@ def test_what_is_not_handled_is_named(text: str, message: str) -> None:
     ],
 )
 def test_what_stands_twice_is_refused(text: str) -> None:
-    assert refused(text).code == "E-TWICE"
+    assert refused(text).code == "PDDL_TWICE"
 
 
 def test_deep_brackets_are_refused() -> None:

@@ -97,7 +97,7 @@ def test_planners_that_insist_are_told_what_is_used() -> None:
     assert ":equality" in by_name["equality"]
 
 
-def test_an_action_whose_cost_is_unknown_is_out_of_the_question() -> None:
+def test_an_action_with_an_unknown_cost_cannot_be_planned_with() -> None:
     domain = written(next(t for t in TEXTS if t.name == "costs").load()).domain
     assert "(known-far ?p ?q)" in domain
 

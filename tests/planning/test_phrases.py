@@ -67,7 +67,7 @@ def test_free_words_bind_nothing(sentence: str) -> None:
     assert asked(goal) == ("maintain", "(following rover person)")
 
 
-def test_question_is_to_be_done_anew_each_time() -> None:
+def test_question_is_to_be_done_again_each_time() -> None:
     question = Phrase("where is {t:target}", "(bearing-known ?t self)", "do")
     compton = replace(COMPTON, phrases=(question,))
     goal = book(compton).goal("where is the radiation source")

@@ -34,7 +34,7 @@ costs = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 99)), max_size=100)
 
 
 @given(costs, costs)
-def test_whose_it_is_never_outweighs_what_it_costs(
+def test_rank_of_a_component_never_outweighs_what_its_action_costs(
     one: list[tuple[int, int]], other: list[tuple[int, int]]
 ) -> None:
     steps = [*one, *other]

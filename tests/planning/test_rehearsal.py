@@ -6,8 +6,8 @@ import pytest
 from tests.planning.differential.semantics import Problem
 from tests.planning.differential.texts import TEXTS, Text
 
+from nondum.planning.ground.lifted import Meaning
 from nondum.planning.search import solve
-from nondum.planning.workbench.lifted import Meaning
 from nondum.planning.workbench.rehearsal import rehearsed
 from nondum.sdk.planner import Plan
 

@@ -53,7 +53,7 @@ def plan(of: GroundTask) -> tuple[list[str], int]:
 
 
 def test_words_of_the_core_mean_what_their_authors_mean() -> None:
-    """`on`, `self` and `not-…` are nothing special in a domain of its own."""
+    """`on`, `self` and `not-…` are nothing special in a standalone domain."""
     steps, _ = plan(task())
     assert steps == ["sail self a c", "load self"]
 
@@ -66,21 +66,21 @@ def test_with_a_metric_an_action_that_names_no_cost_costs_nothing() -> None:
     assert plan(task("(:metric minimize (total-cost))"))[1] == 5
 
 
-def test_action_whose_function_has_no_value_cannot_be_taken() -> None:
+def test_action_with_a_function_without_a_value_cannot_be_taken() -> None:
     names = {action.name for action in task("(:metric minimize (total-cost))").actions}
     assert "sail self a b" in names
     assert "sail self a c" not in names
 
 
 WRONG = {
-    "unknown object": ("(at self d)", "E-UNDECL", "nobody declares 'd'"),
-    "wrong type": ("(at a a)", "E-TYPE", "expected ship, a is port"),
-    "wrong arity": ("(at self)", "E-PRED-ARITY", "(at self) has 1 arguments"),
-    "unknown predicate": ("(att self a)", "E-UNDECL", "nobody declares predicate 'att'"),
-    "half a number": ("(= (way a c) 1.5)", "E-INIT", "only whole numbers"),
-    "negation": ("(not (at self b))", "E-INIT", "is not a fact"),
-    "too big a number": ("(= (way a c) 9007199254740993)", "E-INIT", "numbers below 2^53"),
-    "two numbers": ("(= (way a c) 1) (= (way a c) 2)", "E-TWICE", "(way a c) is 1 at problem"),
+    "unknown object": ("(at self d)", "PDDL_UNKNOWN", "'d' is not declared"),
+    "wrong type": ("(at a a)", "PDDL_TYPE", "expected ship, a is port"),
+    "wrong arity": ("(at self)", "PDDL_ARITY", "(at self) has 1 arguments"),
+    "unknown predicate": ("(att self a)", "PDDL_UNKNOWN", "predicate 'att' is not declared"),
+    "half a number": ("(= (way a c) 1.5)", "PDDL_INIT", "only whole numbers"),
+    "negation": ("(not (at self b))", "PDDL_INIT", "is not a fact"),
+    "too big a number": ("(= (way a c) 9007199254740993)", "PDDL_INIT", "numbers below 2^53"),
+    "two numbers": ("(= (way a c) 1) (= (way a c) 2)", "PDDL_TWICE", "(way a c) is 1 at problem"),
 }
 
 
@@ -102,9 +102,13 @@ def test_all_that_is_wrong_is_told_at_once() -> None:
 
 
 GOALS = {
-    "when": ("(when (on self) (on self))", "E-MISPLACED", "a condition says 'imply'"),
-    "comparison": ("(> (way a b) 2)", "E-UNSUPPORTED", "the numeric condition (> (way a b) 2"),
-    "increase": ("(increase (total-cost) 1)", "E-UNSUPPORTED", "the numeric condition (increase"),
+    "when": ("(when (on self) (on self))", "PDDL_MISPLACED", "a condition says 'imply'"),
+    "comparison": ("(> (way a b) 2)", "PDDL_UNSUPPORTED", "the numeric condition (> (way a b) 2"),
+    "increase": (
+        "(increase (total-cost) 1)",
+        "PDDL_UNSUPPORTED",
+        "the numeric condition (increase",
+    ),
 }
 
 
@@ -127,7 +131,7 @@ def test_unknown_type_is_told_where_it_stands_and_nowhere_else() -> None:
 
 def test_nothing_is_above_object() -> None:
     found = refused(PROBLEM.format(metric=""), DOMAIN.replace("port - place", "object - place"))
-    assert (found.code, found.where) == ("E-TYPE-CYCLE", "domain.pddl:2:11")
+    assert (found.code, found.where) == ("PDDL_TYPE_CYCLE", "domain.pddl:2:11")
 
 
 def test_circle_of_rules_names_those_that_deny_each_other() -> None:
@@ -142,14 +146,14 @@ def test_circle_of_rules_names_those_that_deny_each_other() -> None:
 
 def test_problem_of_another_domain_is_told() -> None:
     [warning] = loaded(PROBLEM.format(metric="").replace(":domain ferry", ":domain boat")).warnings
-    assert warning.code == "E-DOMAIN"
+    assert warning.code == "PDDL_DOMAIN"
     assert "one of domain 'boat'" in warning.message
     assert not loaded(PROBLEM.format(metric="")).warnings
 
 
 def test_problem_without_a_goal_is_refused() -> None:
-    assert refused("(define (problem one) (:domain ferry))").code == "E-GOAL"
+    assert refused("(define (problem one) (:domain ferry))").code == "PDDL_GOAL"
 
 
 def test_two_domains_are_no_task() -> None:
-    assert refused(DOMAIN).code == "E-KIND"
+    assert refused(DOMAIN).code == "PDDL_KIND"

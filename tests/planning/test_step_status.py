@@ -22,7 +22,7 @@ CARRY = ("pick ball0 a", "move a b", "drop ball0 b")
 
 
 def where(tree: TaskTree) -> list[StepStatus]:
-    return [leaf.where() for leaf in tree.children if isinstance(leaf, StepLeaf)]
+    return [leaf.where() for leaf in tree.steps]
 
 
 def states(tree: TaskTree) -> str:
@@ -51,7 +51,7 @@ def test_steps_wait_run_and_are_done() -> None:
     let_pass(robot, tree, "done done done")
 
 
-def test_waiting_step_says_what_it_lacks_and_of_whom() -> None:
+def test_waiting_step_says_what_it_lacks_and_which_step_gives_it() -> None:
     _, tree = carrying()
     tree.tick_once()
     _, move, drop = where(tree)
@@ -124,7 +124,7 @@ def test_actuator_in_use_is_waited_for() -> None:
     assert plan is not None
     tree = task_tree(robot, plan, exclusive=frozenset({"cam"}))
     tree.tick_once()
-    camera = next(leaf for leaf in tree.children if leaf.name.startswith("cam.stream"))
+    camera = next(leaf for leaf in tree.steps if leaf.name.startswith("cam.stream"))
     assert isinstance(camera, StepLeaf)
     assert camera.where().exclusive
     assert camera.where().state is StepState.RUNNING

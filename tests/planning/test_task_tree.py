@@ -23,7 +23,8 @@ from tests.planning.tasks import (
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.execute.running import RunState
-from nondum.planning.execute.task_tree import TaskTree
+from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.task_tree import StepLeaf, TaskTree
 from nondum.sdk.planner import GroundTask
 
 CAMERA, DETECT, TRACK, DRIVE = FOLLOW_PLAN
@@ -205,7 +206,7 @@ def test_behaviour_that_gets_on_is_waited_for() -> None:
     assert tree.control.phase is Phase.UNDER_WAY
 
 
-def test_failing_action_is_given_up_after_tries() -> None:
+def test_failing_action_is_given_up_after_its_attempts() -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(fails=1.0))
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
     let_pass(robot, tree, 30)
@@ -221,9 +222,9 @@ def test_only_a_lasting_action_holds_for_a_while() -> None:
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
     tree.tick_once()
     assert tree.control.runs.keys() == {"pick ball0 a"}
-    assert tree.control.steady(robot.now_s + 3600) == ()
+    assert tree.control.proven(robot.now_s + 3600) == ()
     robot, tree = following()
-    assert set(tree.control.steady(robot.now_s + 3600)) == set(FOLLOW_PLAN)
+    assert set(tree.control.proven(robot.now_s + 3600)) == set(FOLLOW_PLAN)
 
 
 def test_action_that_fails_as_it_is_started_is_tried_again_and_tells_why() -> None:
@@ -246,7 +247,7 @@ def test_effects_may_take_their_time_to_be_seen() -> None:
     let_pass(robot, tree)
     assert robot.started == ["pick ball0 a"]
     assert tree.status is Status.RUNNING
-    assert tree.children[0].why() == "waits for its effects to be seen"  # type: ignore[attr-defined]  # children are step leaves
+    assert tree.steps[0].why() == "waits for its effects to be seen"
 
 
 def test_next_tree_takes_over_what_it_needs() -> None:
@@ -274,7 +275,7 @@ def test_next_tree_halts_what_stands_in_its_way() -> None:
     assert robot.names(RunState.ESTABLISHED) == set(other)
 
 
-def test_behaviour_whose_component_went_away_has_not_failed() -> None:
+def test_behaviour_of_a_component_that_went_away_has_not_failed() -> None:
     robot, tree = following()
     robot.lose("cam", moments=3)
     let_pass(robot, tree, moments=1)
@@ -288,6 +289,33 @@ def test_interruption_halts_everything() -> None:
     robot, tree = following()
     tree.stop(Status.INVALID)
     assert robot.names(RunState.HALTED) == set(FOLLOW_PLAN)
+
+
+class LazyLeaf(StepLeaf):
+    """A leaf that never starts its behaviour."""
+
+    def initialise(self) -> None:
+        pass
+
+
+def test_plan_stalls_at_a_leaf_that_never_starts_its_behaviour() -> None:
+    robot, tree = following("achieve")
+    whole = tree.steps[1]
+    lazy = LazyLeaf(tree.control, 1, RunningLeaves(robot, lambda: robot.now_s))
+    tree.steps = (tree.steps[0], lazy, *tree.steps[2:])
+    tree.replace_child(whole, lazy)
+    let_pass(robot, tree)
+    assert robot.started == [tree.steps[0].name]
+    assert tree.control.phase is Phase.UNDER_WAY
+
+
+def test_leaf_that_is_stopped_halts_its_behaviour() -> None:
+    robot, tree = following()
+    let_pass(robot, tree)
+    leaf = tree.steps[-1]
+    assert leaf.name in robot.names(RunState.ESTABLISHED)
+    leaf.stop(Status.INVALID)
+    assert leaf.name not in robot.names(RunState.STARTING, RunState.ESTABLISHED)
 
 
 def test_behaviours_that_hold_each_other_up_fall() -> None:
@@ -304,15 +332,15 @@ def test_behaviours_that_hold_each_other_up_fall() -> None:
     let_pass(robot, tree)
     assert robot.names(RunState.ESTABLISHED) == {"l.left u", "l.right v"}
     robot.world.forget("seed", "truth", robot.now_s)
-    robot.world.know("seed", "nobody", robot.now_s)
-    robot.world.remove_component("nobody", ())
+    robot.world.know("seed", "stranger", robot.now_s)
+    robot.world.remove_component("stranger", ())
     let_pass(robot, tree)
     assert not robot.running
 
 
 def test_every_leaf_says_why() -> None:
     robot, tree = following()
-    assert [leaf.why() for leaf in tree.children] == [  # type: ignore[attr-defined]  # children are step leaves
+    assert [leaf.why() for leaf in tree.steps] == [
         f"runs for {DETECT}",
         f"runs for {TRACK}",
         f"runs for {DRIVE}",

@@ -1,4 +1,4 @@
-"""The world model: who may say what, what lasts, and what goes away with whom."""
+"""The world model: which component may say what, what lasts, and what leaves with a component."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def world() -> WorldModel:
 
 def stream(world: WorldModel) -> None:
     """A camera streams."""
-    world.set_host_facts("rover", {"free img": "nobody uses it", "ready cam": "healthy"}, 0.0)
+    world.set_host_facts("rover", {"free img": "nothing uses it", "ready cam": "healthy"}, 0.0)
     world.establish("stream cam", "camera", add=["flowing img"], delete=["free img"], at_s=1.0)
 
 
@@ -65,7 +65,7 @@ def test_silent_component_observes_and_runs_nothing(world: WorldModel) -> None:
     assert world.facts == {"free img", "ready cam", "scanned room"}
 
 
-def test_effects_that_are_withdrawn_leave_what_others_say(world: WorldModel) -> None:
+def test_effects_that_are_withdrawn_leave_what_components_say(world: WorldModel) -> None:
     world.succeed("go a b", "base", add=["at b", "tired"], delete=["at a"], at_s=1.0)
     world.know("tired", "nurse", 2.0)
     world.withdraw_effects(["at b", "tired", "unheard of"])
@@ -86,7 +86,7 @@ def test_observed_effects_wait_for_the_observer(world: WorldModel) -> None:
     assert world.facts == {"at a", "tired"}
 
 
-def test_nobody_denies_what_the_host_knows(world: WorldModel) -> None:
+def test_no_component_denies_what_the_host_knows(world: WorldModel) -> None:
     stream(world)
     world.forget("ready cam", "stranger", 2.0)
     assert world.holds("ready cam")
@@ -162,7 +162,7 @@ def test_evidence_tells_both_sides(world: WorldModel) -> None:
     stream(world)
     free = world.evidence("free img")
     assert not free.holds
-    assert said(free.pros) == ["nobody uses it"]
+    assert said(free.pros) == ["nothing uses it"]
     assert said(free.cons) == ["stream cam is established"]
     assert free.cons[0].action == "stream cam"
     flowing = world.evidence("flowing img")
@@ -251,7 +251,7 @@ def test_newest_of_two_observers_wins_and_both_are_named(placed: WorldModel) -> 
     placed.know("at cup b", "right", 0.0)
     assert placed.facts == {"at cup a"}
     [problem] = placed.conflicts()
-    assert problem.code == "E-FACT-CONFLICT"
+    assert problem.code == "PDDL_FACT_CONFLICT"
     assert "left says (at cup a), right says (at cup b)" in problem.message
     assert "the newest is believed: (at cup a)" in problem.message
     placed.forget("at cup a", "left", 2.0)
@@ -259,7 +259,7 @@ def test_newest_of_two_observers_wins_and_both_are_named(placed: WorldModel) -> 
     assert not placed.conflicts()
 
 
-def test_observer_that_moves_on_contradicts_nobody(placed: WorldModel) -> None:
+def test_observer_that_moves_on_contradicts_no_one(placed: WorldModel) -> None:
     placed.know("at cup a", "camera", 0.0)
     placed.know("at cup b", "camera", 1.0)
     assert placed.facts == {"at cup b"}
@@ -284,7 +284,7 @@ def test_functional_predicate_of_one_argument_has_one(world: WorldModel) -> None
     assert world.facts == {"speed fast"}
 
 
-def test_value_that_is_parked_outdoes_nobody(placed: WorldModel) -> None:
+def test_value_that_is_parked_outdoes_no_other(placed: WorldModel) -> None:
     placed.know("at cup a", "left", 0.0)
     placed.know("at cup attic", "right", 1.0)
     assert placed.facts == {"at cup a"}

@@ -72,7 +72,7 @@ kinds = ("know", "forget", "recant", "silence", "seed", "succeed", "establish", 
 
 
 class Life(RuleBasedStateMachine):
-    """Components come, talk, act and go; the model is compared with one that began anew."""
+    """Components come, talk, act and go; the model is compared with a new one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -107,10 +107,10 @@ class Life(RuleBasedStateMachine):
 
     @invariant()
     def nothing_of_those_who_left_remains(self) -> None:
-        anew = told(self.log)
-        assert self.world.facts == anew.facts
-        assert self.world.bare_facts == anew.bare_facts
-        assert self.world.parked() == anew.parked()
+        new = told(self.log)
+        assert self.world.facts == new.facts
+        assert self.world.bare_facts == new.bare_facts
+        assert self.world.parked() == new.parked()
 
     @invariant()
     def a_thing_is_at_one_place(self) -> None:

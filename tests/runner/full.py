@@ -21,7 +21,7 @@ from tests.runner.yardstick import Usage
 
 
 def run(tox: Sequence[str]) -> int:
-    """Run everything; with `tox`, also what has environments of its own. The exit status."""
+    """Run everything; with `tox`, also the environments of tox. The exit status."""
     folder = evidence_folder()
     _print([f"what fails is kept in {folder}"])
     known, ages = budget.read(), age.ages(ROOT)
@@ -32,7 +32,7 @@ def run(tox: Sequence[str]) -> int:
     done = job.beside(*stages.beside_all(folder, options, tox))
     done += job.beside(*stages.of_demonstrations(folder, options))
     after = Usage.now()
-    others = yardstick.load_of_others(before, after, PROCESSORS)
+    others = yardstick.foreign_load(before, after, PROCESSORS)
 
     results = tuple(one for each in done for one in each.results)
     skipped = tuple(one for one in results if one.outcome == "skipped")

@@ -73,7 +73,7 @@ def failures(failed: Sequence[Result], died: Sequence[Done]) -> Iterator[str]:
         yield ""
         yield f"FAILED {one.test}"
         yield from one.message.splitlines()[-MESSAGE_LINES:]
-        yield f"folder: {one.folder or 'none of its own'}"
+        yield f"folder: {one.folder or 'none'}"
 
 
 def total(results: Iterable[Result], unstable: Sequence[Result], more_failed: int) -> str:

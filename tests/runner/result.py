@@ -18,7 +18,7 @@ class Result:
     outcome: str
     """passed, failed or skipped."""
     seconds: float
-    """Of set-up, call and tear-down, by the clock on the wall."""
+    """Of set-up, call and tear-down, in wall-clock time."""
     folder: str = ""
     """The temporary folder of a test that failed."""
     reason: str = ""

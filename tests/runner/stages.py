@@ -75,7 +75,7 @@ def pytest_job(
 
 
 def at_once(number: int) -> tuple[str, ...]:
-    """So many processes of pytest-xdist, each with whole files: what a file shares is made once."""
+    """`number` processes of pytest-xdist, each with whole files: one set of fixtures per file."""
     return ("-n", str(number), "--dist", "loadfile", "--no-loadscope-reorder")
 
 

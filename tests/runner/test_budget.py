@@ -9,7 +9,7 @@ from tests.runner import budget
 from tests.runner.budget import Budget, Spent
 from tests.runner.result import Result
 from tests.runner.stages import ROOT
-from tests.runner.yardstick import Usage, load_of_others
+from tests.runner.yardstick import Usage, foreign_load
 
 BUDGET = Budget(1.0, {"tests/host": 100.0, "tests/cli": 20.0, "tests/sdk": 4.0}, {})
 
@@ -52,10 +52,10 @@ def test_folder_is_beyond_its_budget_at_half_as_much_again(
     assert Spent("tests/x", 1, seconds, allowed).is_beyond is is_beyond
 
 
-def test_others_have_what_neither_was_idle_nor_went_to_the_run() -> None:
+def test_foreign_load_is_what_neither_was_idle_nor_went_to_the_run() -> None:
     before = Usage(at_s=0.0, busy_s=100.0, own_s=1.0)
     after = Usage(at_s=10.0, busy_s=118.0, own_s=16.0)  # of 20 s on two processors: 18 busy, 15 own
-    assert load_of_others(before, after, processors=2) == pytest.approx(0.15)
+    assert foreign_load(before, after, processors=2) == pytest.approx(0.15)
 
 
 def test_every_budget_is_of_a_folder_that_is_there() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 SLOWER_BY = 1.25
 """A machine that takes this much longer than the one of the budgets is not judged."""
 OTHERS = 0.10
-"""Nor is one of whose processor time others take this share."""
+"""Nor is one of whose processor time other programs take this share."""
 
 _ROUNDS = 600
 _BLOCK = bytes(1_000_000)
@@ -41,8 +41,8 @@ class Usage:
         return cls(time.monotonic(), busy_s, own_s)
 
 
-def load_of_others(before: Usage, after: Usage, processors: int) -> float:
-    """The share of all processor time that others took, 0 to 1."""
+def foreign_load(before: Usage, after: Usage, processors: int) -> float:
+    """The share of all processor time that other programs took, 0 to 1."""
     possible_s = (after.at_s - before.at_s) * processors
     others_s = (after.busy_s - before.busy_s) - (after.own_s - before.own_s)
     return min(1.0, max(0.0, others_s / possible_s)) if possible_s > 0 else 0.0

@@ -224,7 +224,7 @@ async def _attempted(
 
 
 def _victim(folder: Path) -> Path:
-    """A file to be changed, as long as nobody has."""
+    """A file for attempts to change, written as it was."""
     folder.mkdir(parents=True, exist_ok=True)
     victim = folder / "victim"
     victim.write_text("of the host, as it was")

@@ -1,4 +1,4 @@
-"""What tests of rooms share."""
+"""What tests of sandboxes share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nondum.host.workers.confinements import Boxed
 
 @pytest.fixture
 def has_users() -> bool:
-    """Whether each worker is a user of its own."""
+    """Whether each worker is a separate user."""
     return False
 
 

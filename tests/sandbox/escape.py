@@ -1,6 +1,6 @@
 """A hostile plugin: tries what a worker must not be able to do, and reports what it could.
 
-Each attempt is made by a child of its own, and succeeded if it returns anything but None: what was
+A separate child makes each attempt, which succeeded if it returns anything but None: what was
 reached. One that returns `judge` succeeded if the test, on the host, finds it so (`baits.JUDGES`).
 `bait` (a setting) says what there is to be reached on the host. It stands by itself: its text is
 the only module of a wheel.
@@ -84,7 +84,7 @@ def read_the_scratch_of_another(bait: Bait) -> Any:
 
 
 @attempt
-def see_what_the_keeper_sees(bait: Bait) -> Any:
+def see_what_init_sees(bait: Bait) -> Any:
     return os.listdir("/.host/dev") or None
 
 
@@ -126,7 +126,7 @@ def make_a_device_node(bait: Bait) -> Any:
     os.mknod(path, 0o600 | 0o020000, os.makedev(1, 3))
     os.close(os.open(path, os.O_RDWR))
     os.unlink(path)
-    return "a node of its own that opens"
+    return "a node that it made and that opens"
 
 
 @attempt
@@ -180,7 +180,7 @@ def change_the_mode_of_a_file_of_the_host(bait: Bait) -> Any:
 
 
 @attempt
-def change_the_mode_of_its_own_code(bait: Bait) -> Any:
+def change_the_mode_of_its_code(bait: Bait) -> Any:
     os.fchmod(os.open(os.path.abspath(__file__), os.O_RDONLY), 0o666)
     return {"judge": ["has mode", os.path.abspath(__file__), 0o666]}
 
@@ -338,9 +338,9 @@ def signal_the_host(bait: Bait) -> Any:
 
 
 @attempt
-def look_into_the_keeper(bait: Bait) -> Any:
+def look_into_init(bait: Bait) -> Any:
     if bait["pid"] and os.path.exists(f"/proc/{bait['pid']}"):
-        return None  # it is not in a room
+        return None  # it is not in a sandbox
     return open("/proc/1/environ").read()[:20]
 
 
@@ -587,7 +587,7 @@ def take_all_memory_as_shared_memory(bait: Bait) -> Any:
 
 @attempt
 def take_all_memory_as_files_in_memory(bait: Bait) -> Any:
-    """Smaller than the largest file, and so many that the largest number of files is not met."""
+    """Each smaller than the largest file, and in all fewer files than it may open."""
     return f"{held(in_memory(16 * MEGABYTE) for _ in range(32))} MB"
 
 

@@ -1,4 +1,4 @@
-"""What a daemon that is the service's user finds of its workers, each of whom is a user of its own.
+"""What a daemon that is the service's user finds of its workers, each of which is another user.
 
 Each function of `CHECKS` is one check; `tests.sandbox.service` runs this where they can be.
 """
@@ -115,9 +115,9 @@ async def deleted_files_that_it_holds_fill_its_scratch(tested: WorkersUnderTest)
     assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
 
 
-async def keeper_that_is_kept_from_answering_counts_as_too_much(tested: WorkersUnderTest) -> None:
+async def init_that_is_kept_from_answering_counts_as_too_much(tested: WorkersUnderTest) -> None:
     await started(tested, "one")
-    os.kill(keeper_of(tested.workers.pids()["one"]), signal.SIGSTOP)
+    os.kill(init_of(tested.workers.pids()["one"]), signal.SIGSTOP)
     exited = await tested.until(WorkerExited)
     assert exited.reason.startswith("SCRATCH_FULL"), exited.reason
 
@@ -142,7 +142,7 @@ async def device_that_a_worker_may_open_anyway_needs_no_node(
         assert HelperClient().put_node("one", "line", node, OF_SERVICE.start) == node
 
 
-async def flood_of_descriptors_holds_nobody_up(tested: WorkersUnderTest) -> None:
+async def flood_of_descriptors_holds_no_other_worker_up(tested: WorkersUnderTest) -> None:
     await fills_and_streams(tested, "openly")
     await sees(tested, "watcher")
     assert tested.workers.search.refusals == 0
@@ -157,7 +157,7 @@ async def worker_that_ends_is_started_again(tested: WorkersUnderTest) -> None:
     assert int(user) in OF_SERVICE
 
 
-async def rooms_are_found_to_have_users(tested: WorkersUnderTest) -> None:
+async def sandboxes_are_found_to_have_users(tested: WorkersUnderTest) -> None:
     file = STATE / "confinement.json"
     place = STATE / "probes"
     (found,) = confinement_probe.findings(file, place)
@@ -191,12 +191,12 @@ CHECKS: tuple[Check, ...] = (
     worker_inherits_no_folder,
     what_it_holds_open_is_counted,
     deleted_files_that_it_holds_fill_its_scratch,
-    keeper_that_is_kept_from_answering_counts_as_too_much,
+    init_that_is_kept_from_answering_counts_as_too_much,
     device_is_the_workers_and_no_other_ones,
     device_that_a_worker_may_open_anyway_needs_no_node,
-    flood_of_descriptors_holds_nobody_up,
+    flood_of_descriptors_holds_no_other_worker_up,
     worker_that_ends_is_started_again,
-    rooms_are_found_to_have_users,
+    sandboxes_are_found_to_have_users,
     where_files_cannot_be_mapped_workers_share_a_user_and_it_is_told,
     no_two_scratch_folders_have_one_user,
 )
@@ -225,8 +225,8 @@ def owner_of(node: Path) -> int | None:
     return node.stat().st_uid if node.exists() else None
 
 
-def keeper_of(pid: int) -> int:
-    """The process above a worker: process 1 of its room."""
+def init_of(pid: int) -> int:
+    """The parent process of a worker: init, process 1 of its sandbox."""
     return int(status(pid)["PPid"])
 
 
@@ -234,10 +234,10 @@ async def found_by(check: Check) -> str:
     """Why a check failed; empty if it did not."""
     folder = STATE / check.__name__
     folder.mkdir()
-    standing = confinement_choice.standing(
-        "auto", Level.NONE, STATE / "standing.json", STATE / "probes"
+    confinement_state = confinement_choice.confinement_state(
+        "auto", Level.NONE, STATE / "confinement-state.json", STATE / "probes"
     )
-    confinement = confinement_choice.confinement(standing, (folder, SDK, LIBRARIES))
+    confinement = confinement_choice.confinement(confinement_state, (folder, SDK, LIBRARIES))
     tested = WorkersUnderTest(folder, replace(TIMING, look_s=0.2), confinement)
     tested.workers.launcher = Kept(confinement)
     try:

@@ -1,4 +1,4 @@
-"""A room ends with its daemon, however far it has been made: nothing waits in it for ever."""
+"""A sandbox ends with its daemon, however far it is set up: no process waits in it for ever."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from nondum.host.workers.confinements import Boxed
 from nondum.host.workers.spare import Spare
 
 bwrap, has_users, is_settled = sys.argv[1], *(word == "yes" for word in sys.argv[2:])
-room = Boxed(bwrap, has_users=has_users)
-spare = Spare(room, room.ground(None))
+boxed = Boxed(bwrap, has_users=has_users)
+spare = Spare(boxed, boxed.ground(None))
 print(spare.popen.pid, flush=True)
 if is_settled:
     spare.settle({STARTUP_S})
@@ -48,7 +48,7 @@ each_kind = pytest.mark.parametrize(
 
 
 class Daemon:
-    """One that has started an interpreter in a room; only its death is of interest."""
+    """A daemon that has started an interpreter in a sandbox; only its death is of interest."""
 
     def __init__(self, process: asyncio.subprocess.Process, outer: int) -> None:
         self._process, self.outer = process, outer
@@ -68,7 +68,7 @@ class Daemon:
 
 
 @each_kind
-async def test_room_that_is_not_begun_ends_with_its_daemon(tmp_path: Path, users: str) -> None:
+async def test_sandbox_that_is_not_begun_ends_with_its_daemon(tmp_path: Path, users: str) -> None:
     bwrap = tmp_path / "bwrap"
     bwrap.write_text(STOPS_FIRST)
     bwrap.chmod(0o755)
@@ -80,7 +80,7 @@ async def test_room_that_is_not_begun_ends_with_its_daemon(tmp_path: Path, users
 
 
 @each_kind
-async def test_room_that_is_half_made_ends_with_its_daemon(users: str) -> None:
+async def test_sandbox_that_is_half_made_ends_with_its_daemon(users: str) -> None:
     daemon = await Daemon.with_spare(users)
     await until_async("a namespace", lambda: children(daemon.outer))
     os.kill(daemon.outer, signal.SIGSTOP)
@@ -90,9 +90,9 @@ async def test_room_that_is_half_made_ends_with_its_daemon(users: str) -> None:
 
 
 @each_kind
-async def test_room_that_waits_for_its_worker_ends_with_its_daemon(users: str) -> None:
+async def test_sandbox_that_waits_for_its_worker_ends_with_its_daemon(users: str) -> None:
     daemon = await Daemon.with_spare(users, is_settled="yes")
-    await until_async("a room", lambda: any(map(is_python, children(daemon.outer))))
+    await until_async("a sandbox", lambda: any(map(is_python, children(daemon.outer))))
     await daemon.dies()
     await until_async("its end", lambda: has_ended(daemon.outer))
 

@@ -26,7 +26,9 @@ def bait(tmp_path: Path) -> Iterator[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("has_users", [False, *([True] if os.geteuid() == 0 else [])])
-async def test_nothing_leaves_a_room(tmp_path: Path, bait: dict[str, Any], has_users: bool) -> None:
+async def test_nothing_leaves_a_sandbox(
+    tmp_path: Path, bait: dict[str, Any], has_users: bool
+) -> None:
     boxed = Boxed(shutil.which("bwrap") or "bwrap", has_users=has_users)
     assert await reached(tmp_path, bait, boxed) == set()
 
@@ -54,7 +56,7 @@ async def test_as_little_is_reached_where_landlock_is_older(
     assert await reached(tmp_path, bait, Held(abi=2)) <= LEFT_WHEN_RESTRICTED | {"signal the host"}
 
 
-async def test_nobody_is_left_a_special_file_without_confinement(
+async def test_no_special_file_is_left_without_confinement(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
     names = ["leave a set id file", *(["make a device node"] if os.geteuid() == 0 else [])]

@@ -1,4 +1,4 @@
-"""The filter of system calls: a program for the kernel, run here by an interpreter of its own."""
+"""The filter of system calls: a program for the kernel, run here by a separate interpreter."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_calls_of_other_machines_end_the_process(number: int) -> None:
         pytest.param("clone", 0, 0x10000011, True, id="a user namespace"),
         pytest.param("ioctl", 1, 0x5401, False, id="asks a terminal"),
         pytest.param("ioctl", 1, 0x5412, True, id="types into a terminal"),
-        pytest.param("ioctl", 1, 0x1_0000_5412, True, id="so, with bits that nobody looks at"),
+        pytest.param("ioctl", 1, 0x1_0000_5412, True, id="so, with bits that the kernel ignores"),
         pytest.param("socket", 0, 2, False, id="internet"),
         pytest.param("socket", 0, 40, True, id="vsock"),
         pytest.param("personality", 0, 0xFFFFFFFF, False, id="asks its personality"),
@@ -193,7 +193,9 @@ def test_touching_a_path_fails_there_so_that_the_file_is_made_instead() -> None:
 
 
 @pytest.mark.parametrize("has_network", [False, True])
-def test_no_pair_sends_datagrams_where_others_sockets_are_near(has_network: bool) -> None:
+def test_no_pair_sends_datagrams_where_sockets_of_other_processes_are_near(
+    has_network: bool,
+) -> None:
     code = filter_of({"sockets": SOCKETS_OF_THE_HOST[has_network]}, "x86_64")
     more = 0o2004000  # SOCK_NONBLOCK, SOCK_CLOEXEC
 

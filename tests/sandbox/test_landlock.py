@@ -53,7 +53,9 @@ def folder(path: Path) -> Path:
 
 @pytest.mark.skipif(ABI < 3, reason="an older Landlock")
 @pytest.mark.parametrize("right", DO)
-def test_right_is_needed_outside_and_had_inside(tmp_path: Path, right: str) -> None:
+def test_right_is_refused_outside_the_writable_folder_and_given_in_it(
+    tmp_path: Path, right: str
+) -> None:
     if right in OF_ROOT and os.geteuid() != 0:
         pytest.skip("needs root, to make devices")
     inside, outside = folder(tmp_path / "inside"), folder(tmp_path / "outside")
@@ -100,7 +102,7 @@ def test_ports_need_the_network(does: str) -> None:
 
 
 @pytest.mark.skipif(ABI < 6, reason="an older Landlock")
-def test_named_sockets_of_others_are_out_of_reach() -> None:
+def test_abstract_sockets_of_other_processes_are_out_of_reach() -> None:
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(f"\0nondum-test-{os.getpid()}")
         server.listen()
@@ -110,7 +112,7 @@ def test_named_sockets_of_others_are_out_of_reach() -> None:
 
 
 @pytest.mark.skipif(ABI < 6, reason="an older Landlock")
-def test_others_are_not_signalled() -> None:
+def test_other_processes_are_not_signalled() -> None:
     assert told(f"{RESTRICTED}tell(failure(lambda: os.kill(os.getppid(), 0)))", {}) == "EPERM"
 
 

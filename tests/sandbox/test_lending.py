@@ -1,4 +1,4 @@
-"""Devices are lent to the worker that was granted them, where it is a user of its own."""
+"""Devices are lent to the worker that was granted them, where it is a separate user."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ async def test_device_is_the_workers_for_as_long_as_it_has_it(
     assert owner(Path(line)) == 0
 
 
-def test_device_that_everybody_may_open_stays_whose_it_is() -> None:
+def test_device_that_everybody_may_open_keeps_its_owner() -> None:
     lending = DeviceOwnership(FIRST_USER)
     lending.lend("it", "/dev/full")
     assert owner(Path("/dev/full")) == 0

@@ -32,7 +32,7 @@ HELD = {
     "signals_host": False,
     "user": 0,
 }
-"""What is seen from within a room that holds."""
+"""What a process sees in a sandbox that holds."""
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def no_bwrap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
 
 
-def test_this_machine_has_rooms() -> None:
+def test_this_machine_has_sandboxes() -> None:
     (found,) = confinement_probe.findings()
     assert (found.level, found.is_available) == (Level.SANDBOXED, True)
     assert found.has_users == (os.geteuid() == 0)
@@ -60,7 +60,7 @@ print(json.dumps([finding.to_dict() for finding in confinement_probe.findings()]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root could have users for workers")
-def test_root_that_has_no_more_users_has_rooms_without() -> None:
+def test_root_that_has_no_more_users_has_sandboxes_without_them() -> None:
     """As in a container whose user namespace is small."""
     told = subprocess.run(
         [sys.executable, "-c", ROOT_OF_A_CONTAINER], capture_output=True, text=True, check=True
@@ -105,7 +105,7 @@ def test_bubblewrap_that_fails_is_told_in_its_words(
     ],
     ids=lambda value: value if isinstance(value, str) else None,
 )
-def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
+def test_sandbox_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
     assert visibility.judged(Level.SANDBOXED, HELD).is_available
     finding = visibility.judged(Level.SANDBOXED, {**HELD, **hole})
     assert not finding.is_available
@@ -113,10 +113,10 @@ def test_room_with_a_hole_is_none(hole: dict[str, object], said: str) -> None:
     assert finding.fix
 
 
-def test_room_whose_workers_share_a_user_says_why() -> None:
-    room = visibility.judged(Level.SANDBOXED, HELD)
-    assert not room.has_users
-    assert "only root" in visibility.sharing(room, "only root can give each its own").reason
+def test_sandbox_says_why_its_workers_share_a_user() -> None:
+    sandboxed = visibility.judged(Level.SANDBOXED, HELD)
+    assert not sandboxed.has_users
+    assert "only root" in visibility.sharing(sandboxed, "only root can give each its own").reason
     assert visibility.sharing(visibility.MISSING, "of anything") == visibility.MISSING
     own = visibility.judged(Level.SANDBOXED, {**HELD, "user": FIRST_USER})
     assert own.has_users
@@ -152,23 +152,26 @@ def test_findings_that_an_earlier_version_kept_are_read(number: int, level: Leve
 
 
 def test_best_level_is_taken(no_bwrap: None) -> None:
-    standing = confinement_choice.standing("auto", Level.RESTRICTED)
-    assert standing.level == Level.RESTRICTED
-    assert [row["level"] for row in standing.to_dict()["missing"]] == ["sandboxed"]
-    assert not list(standing.warnings())
+    confinement_state = confinement_choice.confinement_state("auto", Level.RESTRICTED)
+    assert confinement_state.level == Level.RESTRICTED
+    assert [row["level"] for row in confinement_state.to_dict()["missing"]] == ["sandboxed"]
+    assert not list(confinement_state.warnings())
 
 
 def test_level_that_is_asked_for_is_taken() -> None:
-    assert confinement_choice.standing(Level.RESTRICTED, Level.RESTRICTED).level == Level.RESTRICTED
-    standing = confinement_choice.standing(Level.NONE, Level.RESTRICTED)
-    assert standing.level == Level.NONE
-    (warning,) = standing.warnings()
+    assert (
+        confinement_choice.confinement_state(Level.RESTRICTED, Level.RESTRICTED).level
+        == Level.RESTRICTED
+    )
+    confinement_state = confinement_choice.confinement_state(Level.NONE, Level.RESTRICTED)
+    assert confinement_state.level == Level.NONE
+    (warning,) = confinement_state.warnings()
     assert warning.startswith("plugins are not confined")
 
 
 def test_level_that_is_not_there_is_refused(no_bwrap: None) -> None:
     with pytest.raises(ConfigRefused) as caught:
-        confinement_choice.standing(Level.SANDBOXED, Level.NONE)
+        confinement_choice.confinement_state(Level.SANDBOXED, Level.NONE)
     (problem,) = caught.value.problems
     assert problem.code == "CONFINEMENT_UNAVAILABLE"
     assert (problem.need, problem.have) == ("level sandboxed", "level none")
@@ -189,16 +192,16 @@ def test_host_does_not_start_below_its_minimum(
 ) -> None:
     monkeypatch.setattr(landlock, "version", lambda: 0)
     with pytest.raises(ConfigRefused) as caught:
-        confinement_choice.standing("auto", Level.RESTRICTED)
+        confinement_choice.confinement_state("auto", Level.RESTRICTED)
     (problem,) = caught.value.problems
     assert problem.where == '[workers] minimum_confinement = "restricted"'
     assert "the kernel has no Landlock" in problem.message
-    standing = confinement_choice.standing("auto", Level.NONE)
-    assert standing.level == Level.NONE
-    assert "the kernel has no Landlock" in next(standing.warnings())
+    confinement_state = confinement_choice.confinement_state("auto", Level.NONE)
+    assert confinement_state.level == Level.NONE
+    assert "the kernel has no Landlock" in next(confinement_state.warnings())
 
 
-def test_standing_tells_only_what_is_above_it() -> None:
+def test_confinement_state_tells_only_the_levels_above_it() -> None:
     findings = (
         Finding(Level.SANDBOXED, is_available=False, reason="no bwrap"),
         Finding(Level.RESTRICTED, is_available=True),

@@ -1,4 +1,4 @@
-"""How everything in a worker's room is mounted."""
+"""How everything in a worker's sandbox is mounted."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ MOUNTS = {
     "scratch": "rw nosuid nodev",
     **{place: "ro nosuid nodev noexec" for place in SEALED if Path(place).exists()},
 }
-"""What is mounted in a room, and how."""
+"""What is mounted in a sandbox, and how."""
 OF_THE_KERNEL = {"proc", "tmpfs", "devtmpfs", "devpts"}
 
 
-async def test_mounts_of_a_room(tested: WorkersUnderTest) -> None:
+async def test_mounts_of_a_sandbox(tested: WorkersUnderTest) -> None:
     await guest(tested, "shutil.copy('/proc/self/mountinfo', 'mounts')")
     assert await does(tested) == ""
     (spec,) = tested.folder.glob("guest")
@@ -87,7 +87,7 @@ given = dict(outside="", seen_outside=[], hides_outside=True, changes_user=False
 if how == "bound":
     mounts.bind(folder, folder)
 else:
-    mounts.move_in({**given, "sealed": [], "protected": [], how: [folder]})
+    mounts.pivot({**given, "sealed": [], "protected": [], how: [folder]})
 print(os.statvfs(folder).f_flag)
 """
 

@@ -1,4 +1,4 @@
-"""Each worker of a daemon that is not root but has the helper is a user of its own."""
+"""Each worker of a daemon that is not root but has the helper is a separate user."""
 
 from __future__ import annotations
 

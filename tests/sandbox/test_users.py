@@ -1,4 +1,4 @@
-"""Each worker of a daemon that is root is a user of its own to the kernel."""
+"""Each worker of a daemon that is root is a separate user to the kernel."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_no_two_scratch_folders_have_one_user(folder: Path) -> None:
     assert [Users(OF_ROOT).of(place) for place in reversed(places)] == given[::-1]
 
 
-def test_user_of_another_folder_is_not_taken_whoever_left_it_so(folder: Path) -> None:
+def test_user_of_another_folder_is_not_taken_though_it_owns_both(folder: Path) -> None:
     one, other = folder / "a/one", folder / "b/other"
     for place in (one, other):
         place.mkdir(parents=True)
@@ -196,7 +196,7 @@ def test_scratch_that_is_too_deep_to_be_given_is_emptied(folder: Path) -> None:
     assert not any(place.iterdir())
 
 
-async def test_worker_whose_code_only_root_may_read_works_as_the_hosts_user(
+async def test_worker_works_as_the_hosts_user_where_only_root_may_read_its_code(
     tested: WorkersUnderTest, caplog: pytest.LogCaptureFixture
 ) -> None:
     before = os.umask(0o077)
@@ -219,7 +219,7 @@ async def test_hosts_own_mask_does_not_shut_the_worker_out(tested: WorkersUnderT
     assert is_workers(owner(spec.scratch))
 
 
-async def test_room_that_is_not_there_in_time_is_none(
+async def test_sandbox_that_is_not_there_in_time_is_none(
     tested: WorkersUnderTest, tmp_path: Path
 ) -> None:
     hangs = tmp_path / "bwrap"
@@ -231,7 +231,7 @@ async def test_room_that_is_not_there_in_time_is_none(
     assert failed.value.code == "WORKER_HUNG"
 
 
-def test_no_descriptor_is_left_of_a_room_that_cannot_be_made() -> None:
+def test_no_descriptor_is_left_of_a_sandbox_that_cannot_be_made() -> None:
     boxed = Boxed(BWRAP, has_users=True)
     before = open_descriptors()
     failures = 0

@@ -82,8 +82,8 @@ async def greet(ctx: Context, u: str, h: str) -> str:
     """Say hello once."""
     ctx.progress(0.5, "clearing the throat")
     ctx.output("words").send(Text(Header(frame_id=u), f"hello {h}"))
-    if h == "nobody":
-        raise BehaviourFailed("nobody is there")
+    if h == "absent":
+        raise BehaviourFailed("no one is there")
     if h == "error":
         raise ZeroDivisionError("a mistake of the author")
     ctx.know("greeted", h)

@@ -38,9 +38,9 @@ def test_text_that_a_behaviour_returns_is_its_answer(bench: Bench) -> None:
 
 
 def test_own_failure_keeps_its_words(bench: Bench) -> None:
-    call = bench.behave("greet", u="mouth", h="nobody").assert_failed()
+    call = bench.behave("greet", u="mouth", h="absent").assert_failed()
     assert call.problem is not None
-    assert call.problem.message == "nobody is there"
+    assert call.problem.message == "no one is there"
 
 
 def test_other_errors_are_failures_with_a_place(bench: Bench) -> None:
@@ -83,18 +83,18 @@ def test_optional_input_is_fed_by_its_slot(bench: Bench) -> None:
 
 def test_values_are_transformed_by_mounts(bench: Bench) -> None:
     ahead = Bearing(Header(frame_id=bench.objects["mouth"]), (1.0, 0.0, 0.0), 0.01)
-    bench.set_value("bearing-known", "door", "robot", value=ahead)
-    bench.behave("turn", u="mouth", to_where="door").assert_succeeded()
-    turned = bench.wait_fact("turned", "door")
+    bench.set_value("bearing-known", "gate", "robot", value=ahead)
+    bench.behave("turn", u="mouth", to_where="gate").assert_succeeded()
+    turned = bench.wait_fact("turned", "gate")
     assert turned.header.frame_id == "robot"
     assert turned.azimuth_rad == pytest.approx(math.pi / 2)
 
 
 def test_value_that_went_away_is_unknown(bench: Bench) -> None:
     ahead = Bearing(Header(frame_id="robot"), (1.0, 0.0, 0.0), 0.01)
-    bench.set_value("bearing-known", "door", "robot", value=ahead)
-    bench.unset_value("bearing-known", "door", "robot")
-    bench.behave("turn", u="mouth", to_where="door").assert_failed("VALUE_UNKNOWN")
+    bench.set_value("bearing-known", "gate", "robot", value=ahead)
+    bench.unset_value("bearing-known", "gate", "robot")
+    bench.behave("turn", u="mouth", to_where="gate").assert_failed("VALUE_UNKNOWN")
 
 
 @pytest.mark.parametrize(

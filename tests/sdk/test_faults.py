@@ -91,12 +91,12 @@ class Wide:
         size = 16384
         data = memoryview(
             mmap.mmap(-1, (size + 1) * size)
-        )  # pages that nobody touches cost no memory
+        )  # pages that are never touched cost no memory
         ctx.output("image").send(Image(Header(), size + 1, size, "mono8", size, data))
 
 
 class CarelessCondition:
-    """Says a wrong value where nobody waits for an end."""
+    """Says a wrong value where no task waits for an end."""
 
     @condition("position", predicates=("at",))
     async def position(self, ctx: Context) -> None:
@@ -104,7 +104,7 @@ class CarelessCondition:
 
 
 class Dying:
-    """Its condition, or what it spawned, ends with an error where nobody waits for an end."""
+    """Its condition, or what it spawned, ends with an error where no task waits for an end."""
 
     @hookimpl
     async def start(self, ctx: Context) -> None:

@@ -194,7 +194,7 @@ async def test_full_socket_is_back_pressure(hostile: Pair) -> None:
         end.link.send_event("fill", {"n": sent, "text": "x" * 1000})
         sent += 1
     call = end.link.begin("write", {}, (writing,))
-    os.close(writing)  # the waiting packet holds a duplicate of its own
+    os.close(writing)  # the waiting packet holds a duplicate
     loop = asyncio.get_running_loop()
     raw.setblocking(False)
     for _ in range(sent):
@@ -271,7 +271,7 @@ HOSTILE = {
     "garbage": ([b"\xff\xff\xff"], "PACKET_MALFORMED"),
     "too long": ([bytes(MAX_PACKET + 1)], "PACKET_TOO_LONG"),
     "much too long": ([bytes(2 * MAX_PACKET)], "PACKET_TOO_LONG"),
-    "reply to nobody": ([encode(Reply(1, {}))], "UNKNOWN_CALL"),
+    "reply without call": ([encode(Reply(1, {}))], "UNKNOWN_CALL"),
     "handshake twice": ([encode(Hello((1,), "1", 1))] * 2, "HANDSHAKE"),
     "call twice": ([encode(Request(1, "wait", {}))] * 2, "CALL_TWICE"),
     "no credit": ([encode(Request(n, "wait", {})) for n in range(1, 66)], "NO_CREDIT"),
@@ -289,7 +289,7 @@ async def test_hostile_end_is_cut_off(hostile: Pair, packets: list[bytes], code:
     assert end.link.is_closed
 
 
-async def test_descriptors_nobody_asked_for_are_closed(hostile: Pair) -> None:
+async def test_unrequested_descriptors_are_closed(hostile: Pair) -> None:
     raw, other = hostile
     end = End(other)
     reading, writing = os.pipe()

@@ -1,4 +1,4 @@
-"""What is told of an exception: the author's own line, whoever raised it."""
+"""An exception is reported with the plugin author's own line, whichever library raised it."""
 
 from __future__ import annotations
 

@@ -49,9 +49,7 @@ def test_what_all_of_them_find_is_told_at_once(
     assert refused(folder) == ["SOURCES", "SOURCES"]
 
 
-def test_what_nobody_finds_anything_wrong_with_passes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_source_without_findings_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(tmp_path, monkeypatch, content_check="def check(folder): return []\n")
     check(tmp_path)
 

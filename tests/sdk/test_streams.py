@@ -1,4 +1,4 @@
-"""Streams between real processes: newest wins, and nobody can hurt the producer."""
+"""Streams between real processes: newest wins, and no consumer can hurt the producer."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def pair() -> tuple[SocketPackets, socket.socket]:
 
 
 class Reader:
-    """A consumer in a process of its own, which prints what it reads."""
+    """A consumer in a separate process, which prints what it reads."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
@@ -172,7 +172,7 @@ async def test_frames_may_change_their_size(producer: Source, reader: Reader) ->
     assert slots_of(producer) <= OUTSTANDING + 2
 
 
-async def test_nobody_listening_costs_nothing(producer: Source) -> None:
+async def test_sending_without_a_reader_costs_nothing(producer: Source) -> None:
     producer.send(image(1))
     assert slots_of(producer) == 0
 

@@ -23,7 +23,7 @@ def refused(device: Device) -> BehaviourFailed:
     return failed.value
 
 
-def test_raw_node_is_found_among_others() -> None:
+def test_raw_node_is_found_among_other_nodes() -> None:
     raw = DeviceNode("/dev/nondum/line.004", RAW)
     assert raw_node(Device(LINE.node, LINE.properties, (LINE, raw))) == raw.node
     assert raw_node(Device("/dev/nondum/it", RAW)) == "/dev/nondum/it"

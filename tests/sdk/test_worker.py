@@ -1,4 +1,4 @@
-"""Workers as processes of their own, with this test as their host."""
+"""Workers as separate processes, with this test as their host."""
 
 from __future__ import annotations
 
@@ -132,11 +132,11 @@ async def test_what_the_host_tells_first_is_not_lost(worker: Start) -> None:
     one = await worker()
     bearing = {"header": {}, "direction": [1, 0, 0], "sigma_rad": 0.1}
     await one.greet()
-    known = [["bearing-known", ["door", "robot"], ["bearing", bearing]]]
+    known = [["bearing-known", ["gate", "robot"], ["bearing", bearing]]]
     one.link.send_event("values", {"set": known, "unset": []})
     one.link.send_event("mounts", {"mouth": ["robot", [0, 0, 1], [0, 0, 0, 1]]})
     await one.link.request("describe", {})
-    call = one.behave("turn", **{"u": "mouth", "to-where": "door"})
+    call = one.behave("turn", **{"u": "mouth", "to-where": "gate"})
     with pytest.raises(WorkerFailed) as caught:
         await call
     assert caught.value.code == "FRAME_UNKNOWN", "the value was there; its frame is ''"

@@ -1,4 +1,4 @@
-"""Small file systems of their own kind, mounted for a test."""
+"""Small file systems of different kinds, mounted for a test."""
 
 from __future__ import annotations
 

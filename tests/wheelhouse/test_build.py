@@ -203,13 +203,13 @@ def test_a_plugin_that_cannot_describe_itself_is_refused(
 def test_what_hosts_would_not_plan_with_is_refused_and_not_delivered(
     wheels: Path, tmp_path: Path
 ) -> None:
-    wrong = Problem("E-UNDECL", "nobody declares it")
+    wrong = Problem("PDDL_UNKNOWN", "it is not declared")
     options = build.Options(
         (HERE,), Sources((wheels,), offline=True), judge=lambda index: (wrong,) if index else ()
     )
     source = make_source(tmp_path / "src")
     made = partial(build.build, source, tmp_path / "drive", options, lambda *step: None)
-    assert refused(made, PayloadRefused) == ["E-UNDECL"]
+    assert refused(made, PayloadRefused) == ["PDDL_UNKNOWN"]
     assert not (tmp_path / "drive").exists()
 
 
@@ -286,7 +286,7 @@ def test_a_hostile_dependency_is_refused(built: Build, tmp_path: Path, wheels: P
     assert not (tmp_path / "drive").exists()
 
 
-def test_a_library_is_made_anew_only_when_its_sources_change(
+def test_a_library_is_built_again_only_when_its_sources_change(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

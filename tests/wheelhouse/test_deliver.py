@@ -39,7 +39,7 @@ def test_what_a_build_that_was_killed_left_is_cleared_away(tmp_path: Path) -> No
     assert not left.exists()
 
 
-def test_nobody_who_looks_meanwhile_finds_nothing(tmp_path: Path) -> None:
+def test_the_payload_is_there_at_any_moment_of_a_replacement(tmp_path: Path) -> None:
     drive = tmp_path / "drive"
     contents = build.deliver(made(tmp_path, 0), drive) / "CONTENTS"
     missed, is_over = [], threading.Event()

@@ -44,7 +44,7 @@ def test_many_are_told_shortly(tmp_path: Path) -> None:
 def test_a_wheel_of_nothing_but_foreign_files_takes_no_long_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is not found in so many bytes is not looked for any further."""
+    """The search for a module ends after `MAX_SEARCHED` bytes."""
     held = {"evil/a.so": elf(ARM, bytes(3000)), "evil/b.so": elf(ARM, b"\0PyInit_b\0")}
     assert [p.code for p in judged(tmp_path, held)] == ["WHEEL_MACHINE"]
     monkeypatch.setattr(extensions, "MAX_SEARCHED", 3000)

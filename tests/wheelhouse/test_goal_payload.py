@@ -1,4 +1,4 @@
-"""A payload of goals only: a payload like any other, for whoever may give goals."""
+"""A payload of goals only: a payload like any other, from signers that may give goals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.payload import drive, preflight
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
 
-ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.errand"
+ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.delivery"
 
 
 def judged(folder: Path, *permissions: str) -> Verified:

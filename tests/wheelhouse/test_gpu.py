@@ -1,4 +1,4 @@
-"""GPU memory: of its own, shared with the system, or unknown."""
+"""GPU memory: dedicated, shared with the system, or unknown."""
 
 from __future__ import annotations
 

@@ -64,7 +64,9 @@ CAMERA = PluginDescription(
         pytest.param(b"[]", "INDEX_INVALID", id="a list"),
         pytest.param(PLAIN.replace(b"1", b"2"), "INDEX_INVALID", id="another format"),
         pytest.param(PLAIN.replace(b"{}", b"[]"), "INDEX_INVALID", id="no table"),
-        pytest.param(PLAIN.replace(b"{}", b'{"\\ud83e": {}}'), "INDEX_INVALID", id="half a letter"),
+        pytest.param(
+            PLAIN.replace(b"{}", b'{"\\ud83e": {}}'), "INDEX_INVALID", id="unpaired surrogate"
+        ),
         pytest.param(PLAIN.replace(b"{}", b'{"a": 1}'), "DESCRIPTION_INVALID", id="no description"),
     ],
 )
@@ -78,7 +80,7 @@ def test_what_is_no_index_is_refused(data: bytes, code: str) -> None:
 def test_half_a_letter_is_told() -> None:
     with pytest.raises(PayloadRefused) as refused:
         index.parse(PLAIN.replace(b"{}", b'{"\\ud800": {}}'), "index.json")
-    assert "half a letter" in refused.value.problems[0].message
+    assert "unpaired surrogate" in refused.value.problems[0].message
 
 
 def test_what_uses_nothing_new_has_only_the_first_keys() -> None:

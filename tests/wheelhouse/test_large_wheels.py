@@ -50,7 +50,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 
 
 def large_wheel(folder: Path, name: str, size: int, *, zip64: bool = False) -> Path:
-    """A wheel with one stored member of so many bytes, and what it takes to be one."""
+    """A wheel with one stored member of `size` bytes, and the metadata that it needs."""
     path = folder / f"{name}-1.0-py3-none-any.whl"
     info = INFO.replace("evil", name)
     files = {

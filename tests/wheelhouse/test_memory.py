@@ -22,7 +22,7 @@ def told(needs: Requires, have: Memory) -> list[str]:
     return [str(problem) for problem in memory.problems(needs, have, "org.example.x")]
 
 
-def test_what_is_promised_to_others_is_told_with_what_to_do() -> None:
+def test_memory_reserved_for_other_components_is_reported_with_a_fix() -> None:
     needs = Requires(memory_mb=600, gpu_memory_mb=600)
     have = Memory(1000, Gpu(1000, 1000), Promised(700, 500, 450, ("a",), ("a", "b")))
     short, gpu_short = memory.problems(needs, have, "org.example.x")
@@ -46,7 +46,7 @@ def test_of_many_who_hold_it_some_are_told() -> None:
     assert short.message.endswith("since 900 MB are promised to a, b, c …")
 
 
-def test_nobody_is_told_to_pull_what_has_no_part_in_it() -> None:
+def test_fix_names_no_components_where_none_holds_memory() -> None:
     needs = Requires(memory_mb=2000, gpu_memory_mb=1)
     short, gpu_short = memory.problems(needs, Memory(1000), "org.example.x")
     assert short.message == "there is too little memory"
@@ -55,11 +55,11 @@ def test_nobody_is_told_to_pull_what_has_no_part_in_it() -> None:
     assert gpu_short.fix == "free some GPU memory, or use another host"
 
 
-def test_what_others_use_already_is_not_counted_twice() -> None:
+def test_memory_in_use_is_not_counted_twice() -> None:
     assert told(Requires(memory_mb=500), Memory(500, promised=Promised(700, 0))) == []
 
 
-def test_of_gpu_memory_only_the_sum_of_all_promises_is_known() -> None:
+def test_only_the_sum_of_all_gpu_memory_reservations_is_known() -> None:
     """What is free may be what others have not taken yet, and what they have taken is not free."""
     unused = Memory(PLENTY, Gpu(4000, 4000), Promised(gpu_memory_mb=3000))
     used = Memory(PLENTY, Gpu(1000, 4000), Promised(gpu_memory_mb=3000))

@@ -15,7 +15,7 @@ PLAIN = ZipBuilder().add("evil/__init__.py", b"X = 1\n")
 DATA = PLAIN.bytes()
 DIRECTORY = DATA.index(b"PK\x01\x02")
 ELSEWHERE = "has its directory elsewhere than its end says"
-NO_HEADER = "'evil/__init__.py' has no header of its own where the directory says"
+NO_HEADER = "'evil/__init__.py' has no local header where the directory says"
 
 
 def ended(**lies: int | bool) -> bytes:

@@ -163,7 +163,7 @@ def test_a_missing_dependency_is_told(tmp_path: Path, facts: HostFacts) -> None:
     assert problem.where == "pylock.blinker.toml"
 
 
-def test_wheels_that_unpack_to_more_than_there_is_room_for_are_told(
+def test_wheels_that_unpack_to_more_than_the_free_space_are_refused(
     tmp_path: Path, facts: HostFacts
 ) -> None:
     (tmp_path / "w").mkdir()

@@ -82,7 +82,7 @@ def test_what_does_not_fit_is_told(code: str, requires: str, need: str, have: st
     assert problem.where == "org.example.x"
 
 
-def test_wheels_need_room_to_unpack() -> None:
+def test_wheels_need_free_space_to_unpack() -> None:
     big = locked("a", size=400 * 1024**2)
     assert codes(said(), {"a": big}) == ["DISK_FULL"]
 
@@ -120,7 +120,7 @@ def test_a_lock_without_the_plugin_is_told() -> None:
     assert codes(said(), {"a": locked("b")}) == ["LOCK_INCOMPLETE"]
 
 
-def test_a_plugin_locked_for_others_only_is_told() -> None:
+def test_a_plugin_locked_for_other_hosts_only_is_refused() -> None:
     other = locked("a", more="marker = \"python_version == '3.13'\"\n")
     (problem,) = preflight(said(), {"a": other}, FACTS)
     assert problem.code == "LOCK_INCOMPLETE"

@@ -1,4 +1,4 @@
-"""Whoever verifies a payload is told everything, whatever a host would stop at."""
+"""Verification reports every problem of a payload, where a host stops at the first."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nondum.wheelhouse.trust.judging import Circumstances, Judging
 ID = "org.example.test"
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
 ALICE = Key("alice")
-NOBODY_TRUSTED = Judging(None, Circumstances())
+NO_TRUST = Judging(None, Circumstances())
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_a_folder_without_contents_list_is_told(tmp_path: Path) -> None:
     assert codes(verify(tmp_path, UnsignedAllowed())) == ["CONTENTS_MISSING"]
 
 
-def test_what_nobody_foresaw_is_told_of_that_payload(folder: Path) -> None:
+def test_an_unexpected_error_is_reported_for_that_payload(folder: Path) -> None:
     class Breaking(UnsignedAllowed):
         def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
             raise RuntimeError("unforeseen")
@@ -53,12 +53,12 @@ def test_what_nobody_foresaw_is_told_of_that_payload(folder: Path) -> None:
 
 
 def test_missing_signatures_are_told_first(folder: Path) -> None:
-    assert codes(verify(folder, NOBODY_TRUSTED)) == ["SIG_MISSING"]
+    assert codes(verify(folder, NO_TRUST)) == ["SIG_MISSING"]
 
 
 def test_signatures_that_are_none_are_told(folder: Path) -> None:
     (folder / "CONTENTS.sig").write_text("signed")
-    assert codes(verify(folder, NOBODY_TRUSTED)) == ["SIG_MALFORMED"]
+    assert codes(verify(folder, NO_TRUST)) == ["SIG_MALFORMED"]
 
 
 def test_what_its_signer_may_not_grant_is_told(folder: Path) -> None:
@@ -79,7 +79,7 @@ def test_what_a_host_would_not_come_to_is_told_too(folder: Path) -> None:
         folder / "wheels"
     )
     seal(folder, payload_id=ID)
-    found = verify(folder, NOBODY_TRUSTED)
+    found = verify(folder, NO_TRUST)
     assert {"SIG_MISSING", "MANIFEST_KEY", "WHEEL_SHADOWS", "WHEEL_STARTUP_HOOK"} <= set(
         codes(found)
     )
@@ -89,7 +89,7 @@ def test_what_a_host_would_not_come_to_is_told_too(folder: Path) -> None:
 def test_every_changed_file_is_told(folder: Path) -> None:
     for path in (folder / "payload.toml", folder / "index.json"):
         path.write_bytes(path.read_bytes() + b"\n")
-    assert codes(verify(folder, NOBODY_TRUSTED)) == ["SIG_MISSING", *["HASH_MISMATCH"] * 2]
+    assert codes(verify(folder, NO_TRUST)) == ["SIG_MISSING", *["HASH_MISMATCH"] * 2]
 
 
 def test_everything_is_told_once_and_with_what_to_do(tmp_path: Path) -> None:

@@ -214,7 +214,7 @@ def test_understated_size_is_found_by_reading(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("lie", [-1, 1])
 def test_sizes_that_lie_are_found_by_unpacking(lie: int) -> None:
-    """Checksums are made to fit by whoever lies."""
+    """A forger makes the checksums fit."""
     data = memoryview(WheelBuilder().bytes())
     for member in archive.read(data, NAME).members:
         assert b"".join(archive.unpack(data, member))

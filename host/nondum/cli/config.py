@@ -21,7 +21,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def asked_options(command: _F) -> _F:
-    """Add the options that a daemon is configured with; hands on one `asked`."""
+    """Add the options that a daemon is configured with; the command gets them as `asked`."""
     return _with(_WHICH + _MORE, command)
 
 

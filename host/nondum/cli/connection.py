@@ -22,7 +22,7 @@ TIMEOUT_S = 30.0
 
 @dataclass(slots=True)
 class Session:
-    """One run of the command line; `click` hands it to every command as its `obj`."""
+    """One run of the command line; `click` passes it to every command as its `obj`."""
 
     control: Path | None = None
     as_json: bool = False
@@ -48,13 +48,13 @@ class Session:
         with closing(self.connect(timeout_s=timeout_s)) as client:
             return client.ask(verb, **arguments)
 
-    def short(self, shown: _Shown, *, anew: bool = False) -> _Shown:
+    def short(self, shown: _Shown, *, refresh: bool = False) -> _Shown:
         """Texts, or rows of them, with short names of units and streams; JSON keeps whole ones.
-        `anew`: ask the daemon for the names again if one is shown that is not known yet.
+        `refresh`: ask the daemon for the names again if one is shown that is not known yet.
 
         Raises `NondumError`.
         """
-        if self._names is None or (anew and has_unknown(shown, self._names)):
+        if self._names is None or (refresh and has_unknown(shown, self._names)):
             self._names = self.ask("names")
         return cast(_Shown, all_shortened(shown, self._names))
 

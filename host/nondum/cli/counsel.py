@@ -27,7 +27,7 @@ from nondum.sdk.planner import Answer, GroundTask
 from nondum.wheelhouse.payload.preflight import HostFacts
 
 WAYS_LIMIT = 10
-"""So many alternatives are told."""
+"""The largest number of alternatives that are shown."""
 _SEARCH_S = 2.0
 """How long is planned with one set of payloads."""
 _GLANCE_TRIALS = 12
@@ -143,7 +143,7 @@ class Surroundings:
         return (*advice.unfit, *(c for c in self.flawed if c.name not in told))
 
     def _causes(self, goal: str, advice: Advice) -> tuple[Problem, ...]:
-        """Raises `GoalRefused` for a goal whose words nobody knows."""
+        """Why the goal cannot be had. Raises `GoalRefused` for a goal with unknown words."""
         merged = merge(self.here.contributions, self.here.host)
         try:
             parsed = parse_goal(goal, merged)

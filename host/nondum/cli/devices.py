@@ -33,8 +33,8 @@ def devices(
     """What is plugged in, and who has it.
 
     One row is one device as people plug it in, with all its nodes. DEVICE is its name in the first
-    column, its port or one of its nodes. Of those that nobody uses it is told which payload would
-    use them: one that was here before, that is on a drive, or in the folders given.
+    column, its port or one of its nodes. For a device that no component uses, the payloads that
+    would use it are shown: those that were here before, are on a drive, or in the folders given.
 
     \b
     Examples: nondum devices
@@ -87,7 +87,7 @@ def _names(row: Row) -> set[str]:
 def _drivers(
     session: Session, rows: Iterable[Row], wheelhouses: Iterable[Path]
 ) -> dict[str, tuple[Driver, ...]]:
-    """Device → the known payloads that would use it, for those that nobody uses."""
+    """Device → the known payloads that would use it, for devices that no component uses."""
     unused = [row for row in rows if not row["component"] and row["nodes"]]
     if not unused:
         return {}
@@ -130,7 +130,7 @@ def _show(rows: list[Row], drivers: dict[str, tuple[Driver, ...]]) -> None:
 def _used_by(row: Row) -> str:
     if row["left_alone"]:
         return f"left alone: {row['left_alone']}"
-    who = row["component"] or "nobody"
+    who = row["component"] or "no component"
     if row.get("used_by"):
         who = ", ".join(f"{one['component']} ({one['need']})" for one in row["used_by"])
     others = row["contested_by"]

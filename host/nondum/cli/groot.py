@@ -4,7 +4,7 @@ Source: https://www.behaviortree.dev/docs/learn-the-basics/xml_format, and what 
 parser (`xml_parsing.cpp`, 4.10) refuses. Composites become the library's own control nodes; leaves
 become custom nodes, with a port for each argument, declared in `TreeNodesModel`.
 
-A plan becomes a tree of its own: its steps side by side, each held back by `Await` until the steps
+A plan becomes a separate tree: its steps side by side, each held back by `Await` until the steps
 before it are over and its guard holds. That is less than a task tree does: nothing is skipped, and
 what was undone is not done again.
 """
@@ -54,7 +54,7 @@ class _Document:
         return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
     def tree(self, name: str) -> ET.Element:
-        """Begin a tree of its own."""
+        """Add an empty tree to the file."""
         id = identifier(name)
         self._trees[id] = ET.Element("BehaviorTree", ID=id)
         return self._trees[id]
@@ -71,7 +71,8 @@ class _Document:
             for child in node["children"]:
                 self.node(control, child)
         else:
-            self._leaf(parent, "Action", _of_class(node), {"does": node["name"]}, node)
+            ports = node.get("behaviour") or {"does": node["name"]}
+            self._leaf(parent, "Action", _of_class(node), ports, node)
 
     # Composites
 
@@ -104,7 +105,10 @@ class _Document:
             self._leaf(parent, "Condition", HOLDS, {"facts": task["goal"]})
         side_by_side = ET.SubElement(parent, "Parallel", {"name": "steps", **_ALL})
         for step in steps:
-            self._step(side_by_side, step)
+            if "step" in step:
+                self._step(side_by_side, step)
+            else:  # it runs on from a plan before
+                self.node(side_by_side, step)
 
     def _step(self, parent: ET.Element, node: Node) -> None:
         step = node["step"]

@@ -22,7 +22,7 @@ MOST_BYTES = 4096
 def fleet() -> None:
     """Make a fleet, and certify its hosts.
 
-    Hosts that trust a fleet let in whom it has certified, without being paired.
+    Hosts that trust a fleet let in the hosts that it has certified, without pairing.
 
     Example: nondum keys fleet sign rover.pub --fleet survey -o /media/usb/nondum-peers/certificate
     """
@@ -36,7 +36,7 @@ def fleet() -> None:
 def new(session: Session, folder: Path, name: str | None) -> None:
     """Make a fleet: a secret key, to be kept off all hosts, and a public one.
 
-    Whoever has the secret key can let any host in. Keep DIR on a drive in a drawer.
+    A person who has the secret key can let any host in. Keep DIR on a drive in a drawer.
 
     Example: nondum keys fleet new /media/drawer/survey
     """

@@ -1,4 +1,4 @@
-"""Commands about whom one host trusts."""
+"""Commands about the trust file of one host."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @json_option
 @click.pass_obj
 def list_keys(session: Session, file: Path | None) -> None:
-    """Show whom the host trusts, or what the trust file FILE says.
+    """Show the signers that the host trusts, or those in the trust file FILE.
 
     Example: nondum keys list
     """
@@ -43,7 +43,7 @@ def list_keys(session: Session, file: Path | None) -> None:
     for warning in row.get("warnings", ()):
         render.sentence(warning, colour="yellow", mark="warning: ")
     if trust is None:
-        click.echo("nobody is trusted: nondum keys trust FILE")
+        click.echo("no signer is trusted: nondum keys trust FILE")
         return
     if row:
         render.sentence(f"the first trust file, {row['anchor']}, is {row['first']}")

@@ -1,4 +1,4 @@
-"""Commands for whoever owns robots: keys and the trust file, on a machine that needs no daemon."""
+"""Commands for owners of robots: keys and the trust file, on a machine that needs no daemon."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def revoke(session: Session, file: Path, key: str, why: str) -> None:
 def rotate(session: Session, file: Path, name: str, key: str, until: datetime | None) -> None:
     """Put a new KEY in the place of the one called NAME, root or not.
 
-    What the old one has signed is not believed any more: sign it anew.
+    Signatures of the old key are not valid any more: sign again what it has signed.
 
     Example: nondum keys rotate trust.toml alice alice-2027.pub
     """

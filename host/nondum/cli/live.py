@@ -93,9 +93,9 @@ def redraw(show: Callable[[], object]) -> None:
 def draw(lines: Sequence[str]) -> None:
     """The lines over what the terminal shows, without blanking it first; what does not fit is
     counted."""
-    room = shutil.get_terminal_size().lines - 1
-    if len(lines) > room:
-        lines = [*lines[: room - 1], f"… {len(lines) - room + 1} more lines"]
+    space = shutil.get_terminal_size().lines - 1
+    if len(lines) > space:
+        lines = [*lines[: space - 1], f"… {len(lines) - space + 1} more lines"]
     shown = "".join(f"{line}{_TO_LINE_END}\n" for line in map(_as_wanted, lines))
     sys.stdout.write(f"{_TO_HOME}{shown}{_TO_SCREEN_END}")
     sys.stdout.flush()

@@ -42,7 +42,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),
     "pddl": ("pddl", "Check, merge and plan PDDL files, without a host."),
-    "peers": ("peers", "Other hosts: who is here, and whom this host trusts."),
+    "peers": ("peers", "Other hosts: which are here, and which this host trusts."),
     "place": ("place", "Payloads that run on another host, and where one is to run."),
     "plan": ("mind", "The plans that are being carried out, that of the most urgent goal first."),
     "retry": ("act", "Try again what was refused or quarantined."),
@@ -50,7 +50,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("status", "The host, its payloads and its goals at a glance."),
     "stop": ("act", "Stop this host and its peers at once."),
     "store": ("body", "The wheels that this host keeps."),
-    "streams": ("streams", "Who sends what to whom, and what is sent."),
+    "streams": ("streams", "The streams: their producers, readers and messages."),
     "tree": ("tree", "The behaviour tree as it is being ticked, and why."),
     "units": ("body", "What the robot has to act with."),
     "watch": ("watch", "One live screen: what is wrong, goals, plan, parts, streams."),
@@ -110,7 +110,7 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 refused or failed, 2 wrong usage or bad input,
-    3 problems found, 4 no daemon, 130 interrupted, 141 nobody reads the output any more."""
+    3 problems found, 4 no daemon, 130 interrupted, 141 the reader of the output has left."""
     try:
         code = _run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from nondum.planning.explain.advise import Advice
 
 GLANCES = 3
-"""Of so many suspended goals, people who ask of all get told what would help; it takes its time."""
+"""The number of suspended goals for which `nondum why` looks for what would help: it takes time."""
 
 
 @click.command()
@@ -65,7 +65,7 @@ def facts(session: Session, why: str | None, parked: bool, follow: bool) -> None
             if session.as_json:
                 render.as_json_line(rows)
             else:
-                live.redraw(partial(_show_facts, session.short(rows, anew=True), parked))
+                live.redraw(partial(_show_facts, session.short(rows, refresh=True), parked))
         return
     rows = session.ask("facts", parked=parked)
     render.as_json(rows) if session.as_json else _show_facts(session.short(rows), parked)
@@ -101,7 +101,7 @@ def _explain(session: Session, found: dict[str, Any]) -> None:
         ("note", found["hint"]),
     ]
     if not (found["for"] or found["against"]):
-        render.sentence("nobody has said so")
+        render.sentence("no source has said so")
     for name, text in told:
         if text:
             render.sentence(str(text), mark=f"{name}: ")
@@ -132,7 +132,7 @@ def goals(session: Session, follow: bool) -> None:
             if session.as_json:
                 render.as_json_line(view)
             else:
-                live.redraw(partial(_show_goals, session.short(view, anew=True)))
+                live.redraw(partial(_show_goals, session.short(view, refresh=True)))
         return
     view = session.ask("goals")
     render.as_json(view) if session.as_json else _show_goals(session.short(view))

@@ -180,7 +180,7 @@ def _hanging(text: str, width: int | None, depth: int, mark: str = "") -> Iterat
         yield f"{first}{text}"
         return
     hanging = f"{indent}{'    ' if mark else '  '}"
-    room = max(NARROWEST, width - len(hanging))
-    folded = textwrap.wrap(text, room, break_on_hyphens=False) or [""]
+    space = max(NARROWEST, width - len(hanging))
+    folded = textwrap.wrap(text, space, break_on_hyphens=False) or [""]
     yield f"{first}{folded[0]}"
     yield from (f"{hanging}{line}" for line in folded[1:])

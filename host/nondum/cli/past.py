@@ -12,7 +12,7 @@ from nondum.cli.table import cell, table
 
 USUAL_ROWS, MOST_ROWS = 200, 100_000
 _LEFT_OUT = frozenset({"payload", "digest", "component"})
-"""Details that a table has no room for: the subject says the same in words."""
+"""Details that a table leaves out: the subject says the same in words."""
 
 
 @click.command()
@@ -24,7 +24,7 @@ _LEFT_OUT = frozenset({"payload", "digest", "component"})
 @click.option(
     "--limit",
     type=click.IntRange(1, MOST_ROWS),
-    help="The last so many rows [default: 200; with --since all].",
+    help="The number of rows, the last ones [default: 200; with --since all].",
 )
 @live.since_option
 @live.follow_option(live.APPENDED)
@@ -63,7 +63,7 @@ def journal(
 def _show_entry(session: Session, row: dict[str, Any]) -> None:
     """An entry as a line: what is still to come has no columns yet."""
     said = "  ".join(filter(None, [row["subject"], row["event"], row["step"], _detail(row)]))
-    render.sentence(session.short(said, anew=True), mark=f"{render.clock(row['when'])}  ")
+    render.sentence(session.short(said, refresh=True), mark=f"{render.clock(row['when'])}  ")
 
 
 def _detail(row: dict[str, Any]) -> str:

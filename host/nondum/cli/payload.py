@@ -176,7 +176,7 @@ def goal(
 
     \b
     Examples: nondum payload goal "follow me" -o /media/usb --sign alice
-              nondum payload goal "search for people" "come back" -o drive --id com.acme.errand
+              nondum payload goal "search for people" "come back" -o drive --id com.acme.search
     """
     from nondum.wheelhouse.build import goal_payload
     from nondum.wheelhouse.trust import owners_folder
@@ -249,7 +249,7 @@ def install(session: Session, drive: Path) -> None:
 @json_option
 @click.pass_obj
 def rollback(session: Session, payload_id: str) -> None:
-    """Go back to the release of a payload before the one in force.
+    """Go back to the release of a payload before the active one.
 
     The earlier one must be plugged in, or installed, too; one that is refused only for being older
     is let pass this once. The newer one waits; `nondum retry PAYLOAD` goes forward again.
@@ -261,7 +261,7 @@ def rollback(session: Session, payload_id: str) -> None:
     if session.as_json:
         render.as_json(row)
     else:
-        click.echo(f"{row['payload']} {row['version']} is in force, release {render.release(row)}")
+        click.echo(f"{row['payload']} {row['version']} is active, release {render.release(row)}")
 
 
 def _installed(session: Session, folder: Path, show: ProgressLine) -> Any:

@@ -67,14 +67,14 @@ def merge(
 
 
 def _all(paths: Iterable[Path], units: Sequence[Owned]) -> list[Contribution]:
-    """Raises `FragmentRefused` (E-TWICE) when two components have one name."""
+    """Raises `FragmentRefused` (PDDL_TWICE) when two components have one name."""
     found: dict[str, Contribution] = {}
     for path in paths:
         for contribution in contributions_of(path, units):
             if contribution.component in found:
                 message = f"a second component {contribution.component!r}"
                 fix = "rename the file or folder: components are called after them"
-                raise FragmentRefused(Problem("E-TWICE", message, where=str(path), fix=fix))
+                raise FragmentRefused(Problem("PDDL_TWICE", message, where=str(path), fix=fix))
             found[contribution.component] = contribution
     return list(found.values())
 

@@ -43,7 +43,7 @@ def plan(
     """Find a plan, and print it as the planning competitions write plans.
 
     Plans are checked before they are shown. Exits with 0: a plan, 10: the goal is true already,
-    11: there is no plan, which is proved, 12: nobody knows, 2: bad input.
+    11: there is no plan, which is proved, 12: no planner found an answer, 2: bad input.
 
     \b
     Examples: nondum pddl plan domain.pddl problem.pddl
@@ -84,7 +84,7 @@ def why(
     """Say why a problem has no plan: what is missing, and what would lead to it.
 
     Exits with 11 once that is told, with 0 if there is a plan, 10: the goal is true already,
-    12: nobody knows, 2: bad input.
+    12: no planner found an answer, 2: bad input.
 
     Example: nondum pddl why domain.pddl problem.pddl
     """
@@ -140,4 +140,4 @@ def _words(outcome: Outcome) -> str:
         case "unsolvable":
             return f"there is no plan: {outcome.planner} has looked at all that can be reached"
         case _:
-            return f"nobody knows: {outcome.reason}"
+            return f"no planner found an answer: {outcome.reason}"

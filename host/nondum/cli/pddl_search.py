@@ -28,13 +28,13 @@ EXIT_ALREADY_TRUE = 10
 EXIT_UNSOLVABLE = 11
 EXIT_GAVE_UP = 12
 INSTANCES_LIMIT = 1_000_000
-"""Ground actions that a problem in a file may have: nobody waits for them but who asked."""
+"""Ground actions that a problem in a file may have; more than on a robot: only the caller waits."""
 _TICK_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Whom to ask, and how long they may take."""
+    """The planner to ask (None: all), and the limits of the search."""
 
     planner: str | None
     timeout_s: float
@@ -158,7 +158,7 @@ def _planners(limits: Limits) -> Planners:
 
 
 def _outcome(answer: Answer, task: GroundTask, planner: str) -> Outcome:
-    from nondum.planning.ground.draft import stands_for_goal
+    from nondum.planning.ground.literal_task import stands_for_goal
     from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, Unsolvable
 
     match answer:

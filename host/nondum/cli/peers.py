@@ -1,4 +1,4 @@
-"""Other hosts: who is here, whom this host trusts, and why somebody is not here."""
+"""Other hosts: which are here, which this host trusts, and why one is not here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Row = dict[str, Any]
 @json_option
 @click.pass_context
 def peers(ctx: click.Context, why: bool) -> None:
-    """Other hosts: who is here, and whom this host trusts.
+    """Other hosts: which are here, and which this host trusts.
 
     \b
     Examples: nondum peers
@@ -55,7 +55,7 @@ def show_why(session: Session) -> None:
         return
     click.echo(f"links are secured by {view['security']}")
     if view["process"] is not None:
-        click.echo(f"links are held by a process of their own ({view['process']})")
+        click.echo(f"links are held by a separate process ({view['process']})")
     for problem in view["problems"]:
         render.sentence(problem, colour="red", mark="problem: ")
     for host in view["hosts"]:

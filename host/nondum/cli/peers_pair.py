@@ -34,7 +34,7 @@ def pair(session: Session, host: str | None, yes_code: str | None) -> int:
 
     Run it on both hosts within two minutes. Both show a code: say yes if it is the same one. HOST
     is the other's name or fingerprint, and needed only where more than two hosts are being paired.
-    Without a terminal, and with --json, nobody is asked: say yes with --yes-code from another
+    Without a terminal, and with --json, no question is asked: say yes with --yes-code from another
     command, once a person has seen the code on the other host.
 
     \b

@@ -1,4 +1,4 @@
-"""Commands about whom a running host trusts, and who it is itself."""
+"""Commands about the trust and the identity of a running host."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 @json_option
 @click.pass_obj
 def trust(session: Session) -> None:
-    """Whom this host lets in, whom it does not, and who it is itself.
+    """The hosts that this host lets in, those that it does not, and its own identity.
 
     Example: nondum peers trust
     """
@@ -42,7 +42,7 @@ def trust(session: Session) -> None:
         for row in view[key]
     ]
     columns = ["trusted", "name", "fingerprint", *(["why"] if view["revoked"] else [])]
-    table(rows, columns, empty="nobody is trusted yet: see `nondum peers pair --help`")
+    table(rows, columns, empty="no host is trusted yet: see `nondum peers pair --help`")
 
 
 def _certified(row: dict[str, Any] | None) -> str:
@@ -54,7 +54,7 @@ def _certified(row: dict[str, Any] | None) -> str:
 
 @click.command()
 @click.argument("who", metavar="HOST", shell_complete=complete.trusted)
-@click.option("--why", required=True, help="What to tell whoever asks, for example: stolen.")
+@click.option("--why", required=True, help="The reason, shown to people, for example: stolen.")
 @json_option
 @click.pass_obj
 def revoke(session: Session, who: str, why: str) -> None:
@@ -79,7 +79,7 @@ def revoke(session: Session, who: str, why: str) -> None:
 def forget(session: Session, who: str) -> None:
     """Forget a paired host or a fleet, or that a key was revoked.
 
-    HOST is a name, a fingerprint or a whole key. What was forgotten may be trusted anew.
+    HOST is a name, a fingerprint or a whole key. What was forgotten may be trusted again.
 
     Example: nondum peers forget rover-2
     """
@@ -123,7 +123,7 @@ def key(session: Session, output: Path | None) -> None:
 def certify(session: Session, file: Path) -> None:
     """Show peers this certificate from now on: hosts that trust its fleet let this one in.
 
-    Nobody is let in here by it.
+    This host lets no other host in by it.
 
     Example: nondum peers certify /media/usb/nondum-peers/certificate
     """

@@ -63,7 +63,7 @@ def show(session: Session) -> None:
 
 
 def _show_declined(row: dict[str, Any]) -> None:
-    """Why no host takes it; of one that has a place, nobody asks."""
+    """Show why no host takes a payload, if no host has taken it."""
     if row["host"]:
         return
     for host, problems in row["declined"].items():

@@ -86,8 +86,8 @@ def goal(row: Mapping[str, Any]) -> dict[str, Any]:
 def without_excerpt(problem: str) -> str:
     r"""A problem for a table's cell: without the source that it shows below its place.
 
-    >>> without_excerpt("E-INIT a.pddl:1:7: is no fact\n    (:init (a))\n          ^\n→ correct it")
-    'E-INIT a.pddl:1:7: is no fact → correct it'
+    >>> without_excerpt("PDDL_INIT a.pddl:1:7: no fact\n    (:init (a))\n          ^\n→ correct it")
+    'PDDL_INIT a.pddl:1:7: no fact → correct it'
     """
     return " ".join(line for line in problem.split("\n") if not line.startswith("    "))
 

@@ -69,7 +69,7 @@ class ShelfNames:
             if id != payload.id:
                 others.setdefault(description.name, set()).add(words_of(description))
         own = {one.name for one in payload.components.values()}
-        given = given_names.plugins_of_others(self.kept, payload.id)
+        given = given_names.plugins_of_other_payloads(self.kept, payload.id)
         return {
             name: given_names.of_plugin(
                 name,

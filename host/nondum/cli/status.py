@@ -39,7 +39,7 @@ def status(session: Session, follow: bool) -> None:
         if session.as_json:
             render.as_json_line(view)
         else:
-            live.redraw(partial(show, session.short(view, anew=True)))
+            live.redraw(partial(show, session.short(view, refresh=True)))
 
 
 def show(view: dict[str, Any]) -> None:

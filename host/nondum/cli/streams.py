@@ -1,4 +1,4 @@
-"""Streams: who sends what to whom, and what is sent."""
+"""The streams: their producers, readers and messages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LONGEST_FIELD = 60
     help="Print each message of this stream from now on, one line a message.",
 )
 @click.option(
-    "--count", "-n", type=click.IntRange(min=1), help="With --follow: stop after so many messages."
+    "--count", "-n", type=click.IntRange(min=1), help="With --follow: stop after this number."
 )
 @click.option("--inputs", is_flag=True, help="Show the optional inputs only.")
 @click.option(
@@ -57,7 +57,7 @@ def streams(
     connect: tuple[str, str] | None,
     disconnect: str | None,
 ) -> None:
-    """Who sends what to whom, and what is sent.
+    """The streams: their producers, readers and messages.
 
     RATE is messages a second of late, as the component itself counts them.
 

@@ -74,11 +74,11 @@ def fitted(natural: Sequence[int], width: int) -> list[int]:
     [4, 26, 26]
     """
     widths = list(natural)
-    room = width - GAP * (len(widths) - 1)
-    while sum(widths) > room and (widest := max(widths)) > NARROWEST:
+    space = width - GAP * (len(widths) - 1)
+    while sum(widths) > space and (widest := max(widths)) > NARROWEST:
         wide = [i for i, w in enumerate(widths) if w == widest]
         lower = max([NARROWEST, *(w for w in widths if w < widest)])
-        excess = -(-(sum(widths) - room) // len(wide))
+        excess = -(-(sum(widths) - space) // len(wide))
         for i in wide:
             widths[i] = max(lower, widest - excess)
     return widths

@@ -61,7 +61,7 @@ def _follow(session: Session) -> None:
         if session.as_json:
             render.as_json_line(view)
             continue
-        view = session.short(view, anew=True)
+        view = session.short(view, refresh=True)
         if live.is_screen():
             live.draw(outline(view, width=shown_width()))
         else:

@@ -122,7 +122,7 @@ def _tell(
 
 
 def _signers(folder: Path, trust: Trust | None) -> tuple[list[str], str]:
-    """Whose signatures of a payload hold, and that in words."""
+    """The keys of the valid signatures of a payload, and a sentence about them."""
     try:
         keys: list[str] = signed(folder, trust)["signers"]
     except NondumError:  # its list cannot be read, which is told as a problem
@@ -132,7 +132,7 @@ def _signers(folder: Path, trust: Trust | None) -> tuple[list[str], str]:
     from nondum.wheelhouse.format import contents
 
     is_signed = (folder / contents.SIGNATURE_NAME).exists()
-    return keys, "no signature of it holds" if is_signed else "nobody has signed it"
+    return keys, "no signature of it holds" if is_signed else "no one has signed it"
 
 
 def _rows(problems: Iterable[Problem]) -> list[dict[str, str]]:

@@ -50,10 +50,10 @@ class Section:
     title: str
     lines: tuple[Line, ...]
     newest_last: bool = False
-    """Whether the last lines are kept where there is no room for all, not the first."""
+    """Whether the last lines are kept, not the first, where not all of them fit."""
 
     def shown(self, count: int, width: int | None) -> Iterator[str]:
-        """The title, and so many lines."""
+        """The title, and `count` lines."""
         some = f" ({count} of {len(self.lines)})" if count < len(self.lines) else ""
         yield click.style(cut(f"{self.title}{some}", width), bold=True)
         kept = self.lines[-count:] if self.newest_last else self.lines[:count]
@@ -92,7 +92,7 @@ def waiting(name: str, *, width: int | None, wall_s: float, since_s: float) -> l
     ]
 
 
-def shared(room: int, wanted: Sequence[int]) -> list[int]:
+def shared(space: int, wanted: Sequence[int]) -> list[int]:
     """How many lines each section gets, beside its title: in turn, so that a long one does not take
     the place of those after it.
 
@@ -104,9 +104,9 @@ def shared(room: int, wanted: Sequence[int]) -> list[int]:
         before = list(counts)
         for i, most in enumerate(wanted):
             cost = 1 if counts[i] else 2  # the first line comes with a title
-            if counts[i] < most and room >= cost:
+            if counts[i] < most and space >= cost:
                 counts[i] += 1
-                room -= cost
+                space -= cost
         if counts == before:
             return counts
 
@@ -223,8 +223,8 @@ def _parts(view: View, width: int | None) -> Iterator[Line]:
             told = (_part(row, view["host"]), row["state"], row["problem"])
             yield Line("  ".join(filter(None, told)), "✗", "red")
     well = [_part(r, view["host"]) for r in rows if r["ready"] and r["state"] == "ready"]
-    room = 10_000 if width is None else width - 3
-    for i, line in enumerate(textwrap.wrap(", ".join(well), room, break_on_hyphens=False)):
+    space = 10_000 if width is None else width - 3
+    for i, line in enumerate(textwrap.wrap(", ".join(well), space, break_on_hyphens=False)):
         yield Line(line, *((" ", None) if i else ("✓", "green")))
     if not rows and not view["payloads"]:
         yield Line("nothing is plugged in")

@@ -61,10 +61,10 @@ from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger,
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.helper import privileged
 from nondum.host.service import journal, malloc
+from nondum.host.service.journal_messages import JournalMessages
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
 from nondum.host.service.stop_signals import told_to_stop
-from nondum.host.service.telling import Telling
 from nondum.host.service.words import words
 from nondum.host.sources.devices.slots import DeviceSlotSource
 from nondum.host.sources.devices.software import Software
@@ -149,14 +149,14 @@ async def _run(
     bus = Bus(RULES)
     timing = Timing(startup_s=config.workers.startup_s, settle_beats=config.workers.settle_beats)
     cgroups = await in_thread(_cgroups, folders)
-    standing = await in_thread(
-        confinement_choice.standing,
+    confinement_state = await in_thread(
+        confinement_choice.confinement_state,
         config.workers.confinement,
         config.workers.minimum_confinement,
         folders.confinement,
         folders.probes,
     )
-    confinement = confinement_choice.confinement(standing, folders.of_workers)
+    confinement = confinement_choice.confinement(confinement_state, folders.of_workers)
     if changes_user(confinement):
         await in_thread(let_pass, folders)
     launcher = WorkerLauncher(confinement, cgroups, folders.scratches, timing.startup_s)
@@ -201,7 +201,7 @@ async def _run(
     bus.subscribe(service.on_event)
     bus.subscribe(counter.on_event)
     if journal.is_in_use():
-        bus.subscribe(Telling(catalogue.snapshot).on_event)
+        bus.subscribe(JournalMessages(catalogue.snapshot).on_event)
     listing = executor.installation.listing
     clock = ClockWatch(lambda: executor.trust.trust, bus.emit)
 
@@ -213,7 +213,7 @@ async def _run(
             *_warnings(catalogue, safety[1]),
             *counter.warnings(),
             *crash_attribution.counts(catalogue.snapshot()),
-            *standing.warnings(),
+            *confinement_state.warnings(),
             *feedback.warnings,
             *stop_hook.warnings,
             *stop_button.warnings,
@@ -235,7 +235,11 @@ async def _run(
         neighbours.asking.ask if neighbours else None,
     )
     conversation = Conversation(
-        mind, workers.plugins, workers.pids, lambda words: orders.heard(words), answering.answer
+        mind,
+        workers.plugins,
+        workers.pids,
+        lambda words: orders.take_words(words),
+        answering.answer,
     )
     feedback: Feedback = feedback_parts.made(
         config.feedback,
@@ -243,7 +247,7 @@ async def _run(
         catalogue,
         mind,
         places,
-        lambda: goal_files.concerns,
+        lambda: goal_files.state_reasons,
         conversation,
         news.look_again,
     )
@@ -252,7 +256,7 @@ async def _run(
         catalogue,
         mind,
         workers,
-        standing,
+        confinement_state,
         news,
         listing,
         warnings,

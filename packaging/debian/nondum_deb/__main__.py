@@ -82,7 +82,7 @@ def debian(version: str) -> str:
 
 
 def _settle(root: Path, epoch: int) -> None:
-    """Give every file the modes of a package and one time: not those of whoever builds it."""
+    """Give every file the modes of a package and one time, whatever the umask of the build."""
     for path in [root, *root.rglob("*")]:
         if not path.is_symlink():
             is_program = path.is_dir() or path.parent.name in ("bin", "DEBIAN")

@@ -36,11 +36,11 @@ Priority: optional
 Description: rebuild a robot in the field: plug in a payload, and it plans with it
  A host that takes payloads (signed software on USB drives, devices, other
  computers) while it runs: it verifies and installs them offline, confines each
- in a process of its own, merges what they say of themselves into one planning
+ in a separate process, merges what they say of themselves into one planning
  domain, and reaches goals with what there is. Pulled payloads leave nothing.
  .
- The daemon runs as a service, as the user nondum. It comes with a Python
- environment of its own under /opt/nondum and needs no network.
+ The daemon runs as a service, as the user nondum. It comes with its own
+ Python environment under /opt/nondum and needs no network.
 """
 CHANGELOG = """\
 nondum ({version}) bookworm; urgency=medium

@@ -12,8 +12,8 @@ LOCK = DEBIAN / "requirements.lock"
 BACKEND_LOCK = DEBIAN / "backend.lock"
 """What builds the wheels of the checkout."""
 DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
-"""Of the checkout, what is in the package. pyperplan is here as the DESIGN asks of every package: a
-distribution of its own, for it is under the GPL."""
+"""Of the checkout, what is in the package. pyperplan is a separate distribution, as the DESIGN asks
+of every package: it is under the GPL."""
 EXTRAS = {"nondum": ("fast", "usb")}
 """Of those, the optional parts that are always installed with them."""
 PYTHON = "3.11"

@@ -128,7 +128,7 @@ def _machine_files(root: Path) -> None:
         if not any(map(file.is_relative_to, NOT_INSTALLED)):
             folder = str(file.parent.relative_to(PACKAGING))
             if folder not in FOLDERS:
-                raise BuildFailed(f"{file}: nobody said where on a machine this belongs")
+                raise BuildFailed(f"{file}: FOLDERS does not say where on a machine this belongs")
             _write(root / FOLDERS[folder] / file.name, file.read_text(encoding="utf-8"))
     _write(root / "etc/nondum/host.toml", (DEBIAN / "host.toml").read_text(encoding="utf-8"))
     overrides = (DEBIAN / "lintian-overrides").read_text(encoding="utf-8")

@@ -102,7 +102,7 @@ def _installed() -> frozenset[str]:
 def _own(own: Sequence[Own]) -> None:
     if own:
         words = (word for each in own for word in (*["-e"] * each.is_editable, str(each.path)))
-        # A wheel that was built anew may have the version of the one that is installed.
+        # A wheel that was built again may have the version of the one that is installed.
         held = ("--no-deps", "--no-index", "--no-build-isolation", "--force-reinstall")
         _install(*held, *words)
 

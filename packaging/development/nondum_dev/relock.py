@@ -1,4 +1,4 @@
-"""Writes the lock anew: uv resolves for all versions of Python and all machines at once."""
+"""Writes the lock again: uv resolves for all versions of Python and all machines at once."""
 
 from __future__ import annotations
 

@@ -95,13 +95,13 @@ async def _observe(
     ctx: Context, line: SerialLine, observation: Observation, accuracy_rad: float
 ) -> None:
     while not observation.is_good(accuracy_rad):
-        observation.add(await _heard(line, observation))
+        observation.add(await _received(line, observation))
         if observation.is_due:
             await asyncio.to_thread(observation.look)
             _tell(ctx, observation, accuracy_rad)
 
 
-async def _heard(line: SerialLine, observation: Observation) -> bytes:
+async def _received(line: SerialLine, observation: Observation) -> bytes:
     try:
         async with asyncio.timeout(_SILENCE_S):
             return await line.receive()

@@ -53,7 +53,7 @@ def test_sentence_is_a_wav_file(espeak: Espeak) -> None:
 
 @pytest.mark.parametrize("length", [100, 150, 160, 170, 250])
 def test_data_are_found_however_long_their_path(tmp_path: Path, length: int) -> None:
-    """Venvs lie deep; the library cuts off long paths. In a process of its own: it looks once."""
+    """Venvs lie deep; the library cuts off long paths. In a separate process: it looks once."""
     data = tmp_path / ("d" * max(1, length - len(str(tmp_path)) - 1))
     shutil.copytree(espeakng_loader.get_data_path(), data)
     (tmp_path / "s").mkdir()

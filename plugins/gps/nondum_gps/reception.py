@@ -9,7 +9,7 @@ from nondum_gps.settings import Settings
 
 
 class Reception:
-    """Bytes in, readings out. It has no clock: whoever calls says what time it is."""
+    """Bytes in, readings out. It has no clock: the caller says what time it is."""
 
     def __init__(self, settings: Settings, now_s: float) -> None:
         self._lost_after_s = settings.lost_after_s

@@ -96,7 +96,7 @@ class SimulatedReceiver:
         self._cycle = b"".join(pieces)
 
     def unplug(self) -> None:
-        """Pull it: whoever has the port open finds it gone."""
+        """Pull it: a program that has the port open finds it gone."""
         if not self._unplugged.is_set():
             self._unplugged.set()
             self._thread.join()
@@ -105,5 +105,5 @@ class SimulatedReceiver:
 
     def _send(self) -> None:
         while not self._unplugged.wait(_EVERY_S):
-            with contextlib.suppress(BlockingIOError):  # nobody reads
+            with contextlib.suppress(BlockingIOError):  # no program reads, and the buffer is full
                 os.write(self._ours, self._cycle)

@@ -63,7 +63,7 @@ def test_fix_that_is_lost_is_forgotten_and_comes_again(
     receiver.says(gga())
     bench.wait_fact(*KNOWN)
     receiver.says()
-    is_forgotten(bench)  # though nobody says so: the line has fallen silent
+    is_forgotten(bench)  # though no sentence says so: the line has fallen silent
     bench.wait_until(lambda: bench.logs, "why")
     assert "GPS_SILENT" in bench.logs[-1][1]
     receiver.says(gga())

@@ -38,7 +38,7 @@ class Motion:
     turn_rad_s: float = 0.0
 
     @property
-    def is_standing(self) -> bool:
+    def is_still(self) -> bool:
         """True when it neither drives nor turns."""
         return self.speed_m_s == 0.0 and self.turn_rad_s == 0.0
 

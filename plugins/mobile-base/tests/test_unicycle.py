@@ -50,7 +50,7 @@ def test_command_past_its_deadline_brakes(age_s: float) -> None:
     for step in range(20):
         now = age_s + step * DT
         motion = moved(motion, command, now_s=now, dt_s=DT, limits=LIMITS)
-    assert motion.is_standing
+    assert motion.is_still
 
 
 def test_without_a_command_it_stands() -> None:

@@ -22,7 +22,7 @@ ANSWER_S = 3.0
 _RESET_S = 60.0
 _QUIET_S = 0.1
 _CHATTER = 100
-"""So many pieces of old talk are waited for, at most."""
+"""How many pieces of old output are read and dropped, at most."""
 _POLL_S = 0.05
 _SETTLE_STEPS = 1
 _MARGIN_S = 3.0

@@ -24,7 +24,7 @@ class Settings:
     answer_s: float = 3.0
     """A command that has no answer by then has none: the unit itself takes some milliseconds."""
     reset: bool = False
-    """Drive to the ends before the first aim, as after a power-up without room to move."""
+    """Drive to the ends before the first aim, as after a power-up that could not reach them."""
 
     @classmethod
     def parse(cls, given: Mapping[str, object]) -> Settings:

@@ -49,7 +49,7 @@ class Bench:
             assert self._changed.wait_for(is_so, timeout_s), self.order
 
     def noise(self, data: bytes) -> None:
-        """Bytes from the unit that nobody asked for."""
+        """Bytes from the unit that answer no command."""
         os.write(self._ports["head"][0], data)
 
     def unplug(self) -> None:

@@ -44,7 +44,7 @@ class Lens:
     """Renders views of one panorama; the maps of the projection are made once.
 
     Beyond the edges of the recording everything is grey: repeating the last column would smear
-    whoever stands at the edge over half the view.
+    a person who stands at the edge over half the view.
     """
 
     def __init__(self, clip: Clip, view: View) -> None:

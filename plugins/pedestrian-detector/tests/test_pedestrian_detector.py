@@ -97,7 +97,7 @@ def test_any_encoding_serves(shown: list[Shown], encoding: str) -> None:
     assert near(Spotter(Settings()).spot(message(array, encoding), "person"), column)
 
 
-def test_nobody_is_found_in_noise() -> None:
+def test_no_person_is_found_in_noise() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (320, 480, 3)).astype(np.uint8)
     assert Spotter(Settings()).spot(message(noise), "person").detections == ()
 

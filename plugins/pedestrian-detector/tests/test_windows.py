@@ -23,7 +23,7 @@ def found(*rows: tuple[float, float, float, float, float]) -> tuple[Floats, Floa
     return people(array[:, :4], array[:, 4], OVERLAP)
 
 
-def test_nobody_is_nobody() -> None:
+def test_an_empty_image_has_no_people() -> None:
     windows, scores = found()
     assert windows.shape == (0, 4)
     assert scores.shape == (0,)
@@ -40,7 +40,7 @@ def test_two_side_by_side_stay_two() -> None:
     assert sorted(left for left, *_ in windows.tolist()) == [0, 24]
 
 
-def test_a_window_inside_a_surer_one_goes_without_a_vote() -> None:
+def test_a_window_within_a_surer_one_is_dropped_without_a_vote() -> None:
     windows, _ = found((0, 0, 96, 192, 2.0), (24, 48, 48, 96, 1.0))
     assert windows.tolist() == [[0, 0, 96, 192]]
 

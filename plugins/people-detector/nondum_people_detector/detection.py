@@ -1,4 +1,4 @@
-"""From an image message to a detections message, whoever detects."""
+"""From an image message to a detections message, with any of the detectors."""
 
 from __future__ import annotations
 

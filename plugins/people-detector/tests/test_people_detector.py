@@ -73,7 +73,7 @@ def test_any_encoding_serves(
     assert any(abs(one.box.cx - WALKER[0]) < 15 for one in seen.detections)
 
 
-def test_nobody_is_found_in_noise(worker: Any) -> None:
+def test_no_person_is_found_in_noise(worker: Any) -> None:
     noise = np.random.default_rng(1).integers(0, 255, (360, 320, 3)).astype(np.uint8)
     _, seen = detect(worker(PLUGIN), message(noise))
     assert seen.detections == ()

@@ -74,7 +74,7 @@ class Speaker:
         await self._say(ctx, text)
 
     async def _say(self, ctx: Context, text: str) -> None:
-        """Print always: a sentence that nobody heard can still be read in the log."""
+        """Print always: a sentence that no one heard can still be read in the log."""
         ctx.log.info("says: %s", text)
         if self._outlet is None:
             return

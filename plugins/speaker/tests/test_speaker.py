@@ -24,7 +24,7 @@ def report(bench: Any) -> Any:
 
 
 @pytest.mark.usefixtures("silent")
-def test_report_is_printed_where_nothing_can_be_heard(worker: Any) -> None:
+def test_report_is_printed_without_a_sound_player(worker: Any) -> None:
     bench = worker(PLUGIN, settings={"report": "There is a {thing}!"})
     report(bench).assert_succeeded()
     said = [message for _, message in bench.logs]

@@ -25,7 +25,7 @@ class Inbox:
         folder.mkdir(parents=True, exist_ok=True)
 
     def waiting(self) -> Iterator[Path]:
-        """The files that nobody has taken, oldest first."""
+        """The files that were not taken yet, oldest first."""
         found: list[tuple[int, Path]] = []
         for path in self.folder.glob("*.wav"):
             with contextlib.suppress(OSError):  # it has gone meanwhile
@@ -40,7 +40,7 @@ class Inbox:
         It is renamed. One that this user may not rename, as one of root's in a mount with mapped
         users (EOVERFLOW), stays, and a mark lies beside it. Raises `OSError`.
         """
-        heard = _heard(path)
+        heard = _taken_path(path)
         try:
             path.rename(heard)
         except OSError:
@@ -56,7 +56,7 @@ def may_grow(path: Path) -> bool:
     return time.time() - path.stat().st_mtime < UNFINISHED_S
 
 
-def _heard(path: Path) -> Path:
+def _taken_path(path: Path) -> Path:
     return path.with_name(path.name + HEARD)
 
 
@@ -69,7 +69,7 @@ def _mark(path: Path) -> bytes:
 def _marked(path: Path) -> bytes | None:
     """The mark that lies beside a file; what lies there may be another recording, too."""
     try:
-        with _heard(path).open("rb") as heard:
+        with _taken_path(path).open("rb") as heard:
             return heard.read(MARK_BYTES)
     except OSError:
         return None

@@ -1,8 +1,8 @@
-"""What somebody else says while the robot speaks, cut out of what is heard.
+"""Finds what a person says while the robot speaks, in the sound of the microphone.
 
-Voice activity detection would take what is left of the own voice for a voice. So somebody else
-speaks where much of what was heard is left when the own voice is taken out, and that is loud enough
-to be no leavings.
+Voice activity detection would take the residual echo of the robot's own voice for a voice. So a
+person speaks where much of the sound remains when the own voice is taken out, and where that rest
+is louder than residual echo.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from nondum_speech.own_voice import FRAME, OwnVoice
 from nondum_speech.sound import Samples, Sound
 
 OTHERS_SHARE = 0.3
-"""So much of the amplitude must be left when the own voice is taken out."""
+"""The share of the amplitude that must remain when the own voice is taken out."""
 OTHERS_LEVEL = 0.25
-"""And what is left must be so loud, next to the own voice as it is heard on the mean."""
+"""The least level of the rest, as a share of the mean level of the own voice."""
 LEAST_LEVEL = 50.0
 """Root mean square: the same where the own voice is not heard."""
 SHORTEST, LONGEST = 13, 250
 """Frames of a hundredth of a second: what is left of the own voice comes in shorter bursts, and
 words that stop are shorter."""
 PAUSE = 25
-"""So many frames without anybody end it."""
+"""The number of frames without a voice that end an interruption."""
 _SMOOTHED = 5
 _BEFORE, _AFTER = 15, 20
 """A word begins and ends more softly than is told from what is left of the own voice."""
@@ -44,15 +44,15 @@ class Interruptions:
         self._first: int | None = None
         self._last = 0
 
-    def heard(self, piece: Sound) -> Iterator[Sound]:
-        """Take more of what is heard, and give what somebody else has said until then."""
-        apart = self._own.heard(piece)
+    def feed(self, piece: Sound) -> Iterator[Sound]:
+        """Take more samples; yield each interruption that has ended with them."""
+        apart = self._own.feed(piece)
         begin = len(self._powers)
         self._rest = np.concatenate([self._rest, apart.rest])
         self._powers += _powers(apart.rest)
         self._heard_powers += _powers(apart.heard)
         for frame in range(begin, len(self._powers)):
-            if self._is_others(frame):
+            if self._is_other_voice(frame):
                 self._first = frame if self._first is None else self._first
                 self._last = frame
             elif self._first is not None and frame - self._last > PAUSE:
@@ -61,7 +61,7 @@ class Interruptions:
                     start, end = max(0, first - _BEFORE), self._last + _AFTER
                     yield Sound(self._rest[start * FRAME : end * FRAME])
 
-    def _is_others(self, frame: int) -> bool:
+    def _is_other_voice(self, frame: int) -> bool:
         window = slice(max(0, frame + 1 - _SMOOTHED), frame + 1)
         rest, heard = (_mean(powers[window]) for powers in (self._powers, self._heard_powers))
         self._taken_out += self._heard_powers[frame] - self._powers[frame]

@@ -1,8 +1,8 @@
 """A microphone by ALSA's own recorder, arecord.
 
 No binding of ALSA has wheels for every machine that nondum runs on; and a wheel's own copy of the
-library would not know the machine's plugins and mixers. A program that hangs or crashes harms
-nobody.
+library would not know the machine's plugins and mixers. A program that hangs or crashes does no
+harm to this process.
 """
 
 from __future__ import annotations

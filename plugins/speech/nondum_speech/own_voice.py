@@ -1,7 +1,7 @@
-"""What is heard while one sentence is said, without the own voice.
+"""Takes the robot's own voice out of the microphone's sound, while it says one sentence.
 
-WebRTC's echo canceller takes it out. Players start when they like: when the sentence begins to be
-heard is found by comparing it with what is heard. Until then, what is heard waits.
+WebRTC's echo canceller does so. The delay until a player starts varies: cross-correlation finds
+the sample where the sentence begins to be heard. Samples wait until it is found.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class OwnVoice:
         self._look_at = int(_FIRST_LOOK_S * RATE_HZ)
         self._is_audible = True
 
-    def heard(self, piece: Sound) -> Apart:
-        """Take more of what is heard; give as much as can be told by now."""
+    def feed(self, piece: Sound) -> Apart:
+        """Take more samples; give those whose own voice is known by now, with and without it."""
         self._waiting = np.concatenate([self._waiting, piece.samples])
         if self._played is None:
             self._look()

@@ -11,10 +11,10 @@ from typing import Any
 from nondum.sdk import ConfigRefused, Context, Problem, hookimpl
 from nondum.sdk.settings import parse_settings
 from nondum_espeak import Outlet, VoiceUnknown, find_outlet
-from nondum_speech.ears import Ears
 from nondum_speech.espeak import Espeak
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.inbox import Inbox
+from nondum_speech.listener import SpeechListener
 from nondum_speech.microphone import MicrophoneSilent, find_recorder, recorded
 from nondum_speech.settings import Settings
 from nondum_speech.sound import Sound
@@ -24,11 +24,11 @@ AGAIN_S = 5.0
 
 
 class Speech:
-    """The plugin: one voice and one pair of ears."""
+    """The plugin: one voice, and one listener."""
 
     def __init__(self) -> None:
         self._settings = Settings()
-        self._ears: Ears | None = None
+        self._listener: SpeechListener | None = None
         self._espeak: Espeak | None = None
         self._outlet: Outlet | None = None
         self._one_voice = asyncio.Lock()
@@ -49,43 +49,43 @@ class Speech:
         if self._outlet is None:
             ctx.log.info("no sound player is here: what is said will be printed only")
         listens = settings.stop_while_speaking
-        self._ears = Ears(self._espeak, ctx.log, settings.limits, listens_on=listens)
+        self._listener = SpeechListener(self._espeak, ctx.log, settings.limits, listens_on=listens)
         inbox = Inbox(Path(settings.inbox) if settings.inbox else ctx.scratch / "inbox")
         ctx.log.info("WAV files in %s are heard", inbox.folder)
-        ctx.spawn(self._ears.watch(inbox))
+        ctx.spawn(self._listener.watch(inbox))
         if settings.microphone:
-            ctx.spawn(_attend(ctx, self._ears, settings.microphone))
+            ctx.spawn(_attend(ctx, self._listener, settings.microphone))
 
     @hookimpl
     async def stop(self, ctx: Context) -> None:
         """End the recogniser."""
-        if self._ears is not None:
-            await self._ears.close()
+        if self._listener is not None:
+            await self._listener.close()
 
     @hookimpl
     async def learn_words(self, ctx: Context, vocabulary: Mapping[str, Any]) -> None:
         """Hear what can be said now, and nothing else."""
-        if self._ears is not None:
+        if self._listener is not None:
             names = {slot: tuple(words) for slot, words in vocabulary["names"].items()}
             phrases, stops = vocabulary["phrases"], vocabulary.get("stops", ())
-            await self._ears.learn(Vocabulary(tuple(phrases), names, tuple(stops)))
+            await self._listener.learn(Vocabulary(tuple(phrases), names, tuple(stops)))
 
     @hookimpl
     async def listen(self, ctx: Context) -> dict[str, str]:
         """Wait for a sentence."""
-        assert self._ears is not None, "asked only once started"
-        return {"words": await self._ears.sentences.get()}
+        assert self._listener is not None, "asked only once started"
+        return {"words": await self._listener.sentences.get()}
 
     @hookimpl
     async def speak(self, ctx: Context, text: str) -> None:
         """Say anything, one sentence at a time; only words that stop are heard meanwhile."""
-        assert self._ears is not None, "asked only once started"
+        assert self._listener is not None, "asked only once started"
         ctx.log.info("says: %s", text)
         if self._outlet is None:
             return
         async with self._one_voice:
             sound = await self._sound(text)
-            with self._ears.saying(sound):
+            with self._listener.saying(sound):
                 try:
                     await self._outlet.play(sound.to_wav())
                 except (OSError, TimeoutError) as error:
@@ -104,14 +104,14 @@ class Speech:
             raise ConfigRefused(Problem("SETTING_INVALID", str(unknown), where=where)) from unknown
 
 
-async def _attend(ctx: Context, ears: Ears, device: str) -> None:
+async def _attend(ctx: Context, listener: SpeechListener, device: str) -> None:
     """Hear a microphone, and look for it again when it is gone; told once each time."""
     told = ""
     while True:
         why = "there is no arecord, or nothing to record from"
         if recorder := find_recorder(os.environ):
             try:
-                await ears.attend(recorded(recorder, device))
+                await listener.attend(recorded(recorder, device))
             except MicrophoneSilent as silent:
                 why = str(silent)
         if why != told:

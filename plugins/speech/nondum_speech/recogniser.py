@@ -36,8 +36,8 @@ _UNSAID = "something"
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """What a sound was taken for."""
+class Recognition:
+    """The sentence that a sound was taken for, and with which confidence."""
 
     words: str
     """The nearest sentence; empty where there is none."""
@@ -56,7 +56,7 @@ class Limits:
     """For words that stop the robot: a stop that is missed is worse than one too many."""
 
 
-NOTHING = Heard("", float("-inf"))
+NOTHING = Recognition("", float("-inf"))
 
 
 class FreeHearing:
@@ -89,7 +89,7 @@ class Recogniser:
         self._grammatical = _decoder_of(vocabulary, lexicon)
         self._stopping = _decoder_of(replace(vocabulary, phrases=vocabulary.stops), lexicon)
 
-    def hear(self, sound: Sound) -> Heard:
+    def hear(self, sound: Sound) -> Recognition:
         """Recognise one sentence, in about a quarter of the time that it took to say it."""
         samples = made_audible(sound)
         sentence = _sentence(self._grammatical, samples)
@@ -104,7 +104,7 @@ class Recogniser:
         text = " ".join(_with_free_words(sentence, words))
         limits = self._limits
         limit = limits.stop_confidence if text in self._stops else limits.confidence
-        return Heard(text, confidence, said=text if confidence >= limit else "")
+        return Recognition(text, confidence, said=text if confidence >= limit else "")
 
     def stop_in(self, sound: Sound) -> str:
         """Words that stop, unless another sentence that can be said is clearly nearer to what

@@ -24,14 +24,14 @@ def main() -> None:
     """Answer until standard input ends."""
     out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever else is printed
-    ears = _Ears()
+    handler = _RequestHandler()
     while (request := _read(sys.stdin.buffer)) is not None:
-        out.write(framed(ears.answer(request)))
+        out.write(framed(handler.answer(request)))
         out.flush()
 
 
-class _Ears:
-    """All that this process hears with."""
+class _RequestHandler:
+    """Answers requests, with the vocabulary that was learnt last."""
 
     def __init__(self) -> None:
         self._free: FreeHearing | None = None
@@ -40,7 +40,7 @@ class _Ears:
         self._canceller = EchoCanceller(RATE_HZ)
 
     def answer(self, request: object) -> object:
-        """Do what is asked."""
+        """Carry out one request, and return its answer."""
         match request:
             case Learn(vocabulary, lexicon, limits):
                 self._free = self._free or FreeHearing()
@@ -54,10 +54,10 @@ class _Ears:
         return None
 
     def _stop_in(self, piece: Sound) -> str:
-        """Words that stop, once a sentence of the robot's own."""
+        """Find words that stop, at most once while the robot says one sentence."""
         if self._interruptions is None or self._recogniser is None:
             return ""
-        said = (self._recogniser.stop_in(other) for other in self._interruptions.heard(piece))
+        said = (self._recogniser.stop_in(other) for other in self._interruptions.feed(piece))
         words = next(filter(None, said), "")
         if words:
             self._interruptions = None

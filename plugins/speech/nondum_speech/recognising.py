@@ -1,4 +1,4 @@
-"""A recogniser in a process of its own.
+"""A recogniser in a separate process.
 
 PocketSphinx holds Python's global lock while it loads its model and while it decodes, seconds on a
 small computer: in the worker's own process no heartbeat would be sent meanwhile, and the host would
@@ -15,7 +15,7 @@ from typing import Any
 
 from nondum_speech.grammar import Vocabulary
 from nondum_speech.lexicon import Lexicon
-from nondum_speech.recogniser import NOTHING, Heard, Limits
+from nondum_speech.recogniser import NOTHING, Limits, Recognition
 from nondum_speech.requests import LENGTH, Learn, Piece, Says, framed
 from nondum_speech.sound import Sound
 
@@ -44,9 +44,9 @@ class Recognising:
         self._learn = Learn(vocabulary, lexicon, self._limits)
         await self._asked(self._learn)
 
-    async def hear(self, sound: Sound) -> Heard:
+    async def hear(self, sound: Sound) -> Recognition:
         """Recognise one sentence. Raises `RecogniserEnded`."""
-        heard: Heard = await self._asked(sound) if self._learn else NOTHING
+        heard: Recognition = await self._asked(sound) if self._learn else NOTHING
         return heard
 
     async def says(self, sound: Sound) -> None:
@@ -67,7 +67,7 @@ class Recognising:
             await self._process.wait()
 
     async def _asked(self, request: object) -> Any:
-        # Who asks may be cancelled; the answer is read all the same, or the next would get it.
+        # The caller may be cancelled; the answer is read all the same, or the next call gets it.
         return await asyncio.shield(asyncio.create_task(self._answer(request)))
 
     async def _answer(self, request: object) -> Any:

@@ -28,7 +28,7 @@ class Sentences:
         self._rest = b""
         self._voiced = bytearray()
 
-    def heard(self, data: bytes) -> Iterator[Sound]:
+    def feed(self, data: bytes) -> Iterator[Sound]:
         """Take more samples, and give each sentence that has ended with them."""
         self._rest += data
         size = self._endpointer.frame_bytes
@@ -62,4 +62,4 @@ class Sentences:
 def sentences_of(sound: Sound) -> tuple[Sound, ...]:
     """The sentences of a recording."""
     cutter = Sentences()
-    return (*cutter.heard(sound.to_bytes()), *cutter.ended())
+    return (*cutter.feed(sound.to_bytes()), *cutter.ended())

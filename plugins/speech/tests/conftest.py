@@ -1,4 +1,4 @@
-"""What the tests share: one voice, and ears for one small vocabulary."""
+"""What the tests share: one voice, and a recogniser of one small vocabulary."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def free() -> FreeHearing:
 
 
 @pytest.fixture(scope="session")
-def ears(espeak: Espeak, free: FreeHearing) -> Recogniser:
-    """Ears for `VOCABULARY`, as strict as they are shipped."""
+def recogniser(espeak: Espeak, free: FreeHearing) -> Recogniser:
+    """A recogniser of `VOCABULARY`, with the limits that are shipped."""
     words = lexicon(VOCABULARY.words, lambda word, voice: espeak.phonemes(word, voice=voice))
     return Recogniser(VOCABULARY, words, free, Settings().limits)

@@ -1,4 +1,4 @@
-"""A simulated microphone beside a loudspeaker: it hears the robot and whoever speaks to it."""
+"""A simulated microphone beside a loudspeaker: it hears the robot and persons who speak to it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PIECE = RATE_HZ // 50
 
 
 def overheard(own: Sound, word: Sound | None = None, *, at_s: float = 2.0) -> Sound:
-    """The own voice after its way through a simulated room, at half its strength, and a person's
+    """The own voice at half its strength and with a simulated reverberation, and a person's
     words."""
     chance = np.random.default_rng(5)
     way = np.zeros(1600)

@@ -47,7 +47,7 @@ def test_name_of_a_host_has_no_article() -> None:
     assert "<addressee> = (mule);" in rules(vocabulary)
 
 
-def test_robot_whose_name_cannot_be_pronounced_can_be_stopped() -> None:
+def test_robot_with_an_unpronounceable_name_can_be_stopped() -> None:
     vocabulary = Vocabulary(("[{who}] [please] stop", "find {who}"), {"who": ("дом",)})
     assert rules(vocabulary, "дом") == ["public <said> = [please] stop;"]
 

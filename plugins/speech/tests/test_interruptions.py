@@ -1,4 +1,4 @@
-"""The robot hears through its own voice who interrupts it. The room is simulated."""
+"""The robot recognises interruptions through its own voice. The acoustics are simulated."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def interruptions(own: Sound, heard: Sound) -> list[Sound]:
     """Those in what is heard, by a robot that has spoken before."""
     canceller, before = EchoCanceller(RATE_HZ), said(ROBOT)
     listening = Interruptions(OwnVoice(before, canceller))
-    assert not [1 for piece in pieces(overheard(before)) for _ in listening.heard(piece)]
+    assert not [1 for piece in pieces(overheard(before)) for _ in listening.feed(piece)]
     listening = Interruptions(OwnVoice(own, canceller))
-    return [other for piece in pieces(heard) for other in listening.heard(piece)]
+    return [other for piece in pieces(heard) for other in listening.feed(piece)]
 
 
 def test_way_from_loudspeaker_to_microphone_is_found() -> None:
@@ -50,7 +50,7 @@ def test_voice_of_somebody_else_is_not_taken_for_the_own(seconds: float) -> None
 
 def test_own_voice_is_taken_out_and_the_person_left() -> None:
     own, word = OwnVoice(said(ROBOT), EchoCanceller(RATE_HZ)), said("hold still")
-    apart = [own.heard(piece) for piece in pieces(overheard(said(ROBOT), word))]
+    apart = [own.feed(piece) for piece in pieces(overheard(said(ROBOT), word))]
     heard, rest = (np.concatenate([getattr(one, of) for one in apart]) for of in ("heard", "rest"))
     alone = slice(RATE_HZ, 2 * RATE_HZ)
     there = slice(2 * RATE_HZ, 2 * RATE_HZ + len(word.samples))
@@ -65,7 +65,7 @@ def test_robot_does_not_interrupt_itself(own: str) -> None:
 
 @pytest.mark.parametrize("own", [ROBOT, ROBOT_OF_STOPS])
 @pytest.mark.parametrize("word", STOPPING)
-def test_word_that_stops_is_heard_through_the_own_voice(
+def test_stop_word_is_recognised_through_the_own_voice(
     word: str, own: str, recogniser: Recogniser
 ) -> None:
     found = interruptions(said(own), overheard(said(own), said(word)))
@@ -77,7 +77,7 @@ def test_word_is_given_a_pause_after_it_ended() -> None:
     listening = Interruptions(OwnVoice(said(ROBOT), EchoCanceller(RATE_HZ)))
     ended = at_s + word.seconds
     for number, piece in enumerate(pieces(overheard(said(ROBOT), word, at_s=at_s))):
-        if list(listening.heard(piece)):
+        if list(listening.feed(piece)):
             assert number / 50 < ended + PAUSE / 100 + 0.2
             return
     pytest.fail("it is not given")
@@ -89,7 +89,7 @@ def test_another_sentence_that_can_be_said_stops_nothing(recogniser: Recogniser)
     assert not any(map(recogniser.stop_in, found))
 
 
-def test_person_is_heard_where_the_own_voice_is_not(recogniser: Recogniser) -> None:
+def test_person_is_recognised_where_the_own_voice_is_not(recogniser: Recogniser) -> None:
     samples = SILENCE.samples.copy()
     samples[3 * RATE_HZ : 3 * RATE_HZ + len(said("freeze").samples)] += said("freeze").samples
     (other,) = interruptions(said(ROBOT), Sound(samples))
@@ -97,7 +97,7 @@ def test_person_is_heard_where_the_own_voice_is_not(recogniser: Recogniser) -> N
     assert not interruptions(said(ROBOT), SILENCE)
 
 
-def test_hum_that_does_not_end_is_nobody() -> None:
+def test_endless_hum_is_not_taken_for_a_person() -> None:
     length = LONGEST * RATE_HZ // 100
     hum = np.sin(np.arange(length + RATE_HZ) / 20) * 3000
     samples = np.pad(hum, (RATE_HZ, RATE_HZ)).astype(np.int16)
@@ -106,7 +106,9 @@ def test_hum_that_does_not_end_is_nobody() -> None:
     assert len(interruptions(said(ROBOT), Sound(shorter))) == 1
 
 
-def test_stop_is_not_heard_where_none_can_be_said(espeak: Espeak, free: FreeHearing) -> None:
+def test_stop_is_not_recognised_where_no_stop_word_is_known(
+    espeak: Espeak, free: FreeHearing
+) -> None:
     vocabulary = Vocabulary(("search for people",))
     words = lexicon(vocabulary.words, lambda word, voice: espeak.phonemes(word, voice=voice))
     recogniser = Recogniser(vocabulary, words, free, Settings().limits)

@@ -1,4 +1,4 @@
-"""A recogniser in a process of its own."""
+"""A recogniser in a separate process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def said(espeak: Espeak, text: str) -> Sound:
     return espeak.say(text, voice="en-us", words_per_minute=140)
 
 
-def test_sentence_is_heard_and_nothing_before_anything_was_learnt(
+def test_sentence_is_recognised_only_after_a_vocabulary_was_learnt(
     espeak: Espeak, words: Lexicon
 ) -> None:
     async def hear() -> None:
@@ -60,7 +60,7 @@ def test_sentence_is_heard_and_nothing_before_anything_was_learnt(
     asyncio.run(hear())
 
 
-def test_word_that_stops_is_heard_while_the_robot_speaks_and_learns(
+def test_stop_word_is_recognised_while_the_robot_speaks_and_learns(
     words: Lexicon,
 ) -> None:
     own, word = recorded(ROBOT), recorded("hold still")
@@ -116,7 +116,7 @@ def test_process_that_was_killed_is_started_again_and_knows_the_words(
     asyncio.run(hear())
 
 
-def test_answer_that_nobody_waits_for_any_more_is_not_the_next_ones(
+def test_answer_to_a_cancelled_request_is_not_given_to_the_next(
     espeak: Espeak, words: Lexicon
 ) -> None:
     async def hear() -> None:

@@ -40,7 +40,7 @@ def say(bench: Any, tmp_path: Path) -> Say:
     return said
 
 
-def test_sentence_that_was_said_is_heard(bench: Any, say: Say, tmp_path: Path) -> None:
+def test_spoken_sentence_is_recognised(bench: Any, say: Say, tmp_path: Path) -> None:
     said = say("Please point at the radiation source.")
     bench.ask("learn_words", vocabulary=WORDS)
     said.rename(tmp_path / "in" / "one.wav")
@@ -48,7 +48,7 @@ def test_sentence_that_was_said_is_heard(bench: Any, say: Say, tmp_path: Path) -
     assert [path.name for path in (tmp_path / "in").iterdir()] == ["one.wav.heard"]
 
 
-def test_file_that_cannot_be_marked_is_told_and_others_are_heard(
+def test_file_that_cannot_be_marked_is_reported_and_the_next_is_recognised(
     bench: Any, say: Say, tmp_path: Path
 ) -> None:
     bench.ask("learn_words", vocabulary=WORDS)
@@ -58,9 +58,7 @@ def test_file_that_cannot_be_marked_is_told_and_others_are_heard(
     assert bench.ask("listen") == {"words": "follow people"}
 
 
-def test_what_is_heard_before_anything_was_learnt_waits(
-    bench: Any, say: Say, tmp_path: Path
-) -> None:
+def test_file_that_comes_before_the_vocabulary_waits(bench: Any, say: Say, tmp_path: Path) -> None:
     say("Follow people.").rename(tmp_path / "in" / "one.wav")
     bench.ask("learn_words", vocabulary=WORDS)
     assert bench.ask("listen") == {"words": "follow people"}
@@ -108,21 +106,21 @@ def test_wrong_settings_refuse_the_component(worker: Any, settings: dict[str, ob
 def test_microphone_is_listened_to_and_the_own_voice_is_not(
     worker: Any, espeak: Espeak, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Programs stand for arecord and paplay: one plays what the other records, as a room does."""
+    """Programs stand for arecord and paplay: the one records what the other plays."""
     sound = espeak.say("follow people", voice="en-us", words_per_minute=160)
     # So much silence that the voice is through all pipes when its player ends.
     (tmp_path / "voice").write_bytes(sound.to_bytes() + bytes(1_000_000))
-    os.mkfifo(tmp_path / "room")
-    program(tmp_path / "arecord", f'test "$3" = mic && exec cat <> {tmp_path}/room')
-    program(tmp_path / "paplay", f"cat > /dev/null; exec cat {tmp_path}/voice > {tmp_path}/room")
+    os.mkfifo(tmp_path / "sound")
+    program(tmp_path / "arecord", f'test "$3" = mic && exec cat <> {tmp_path}/sound')
+    program(tmp_path / "paplay", f"cat > /dev/null; exec cat {tmp_path}/voice > {tmp_path}/sound")
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("PULSE_SERVER", "unix:/nowhere")
     bench = worker(PLUGIN, settings={"microphone": "mic"})
     bench.ask("learn_words", vocabulary=WORDS)
     bench.ask("speak", text="It says: follow people.")
     said = espeak.say("point at the radiation source", voice="en-us", words_per_minute=160)
-    with (tmp_path / "room").open("wb") as room:
-        room.write(bytes(64_000) + said.to_bytes() + bytes(64_000))
+    with (tmp_path / "sound").open("wb") as pipe:
+        pipe.write(bytes(64_000) + said.to_bytes() + bytes(64_000))
     assert bench.ask("listen") == {"words": "point at the radiation source"}
 
 

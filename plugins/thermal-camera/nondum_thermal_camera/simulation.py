@@ -2,8 +2,8 @@
 
 The model, and all that it claims:
 1. What differs from the median of the whole recording is a warm body: the largest difference of
-   the three colours, from `SHADOW` (a cast shadow is not warm) up to `CERTAIN`. So whoever stands
-   still for most of the recording counts as background.
+   the three colours, from `SHADOW` (a cast shadow is not warm) up to `CERTAIN`. So a person who
+   stands still for most of the recording counts as background.
 2. The background is at ambient temperature; a tenth of its brightness shows through, as
    emissivity differs between materials.
 3. Bodies are warmer than that by up to `BODY` grey levels; clothing hides part of it, and the

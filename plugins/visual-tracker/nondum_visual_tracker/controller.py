@@ -14,7 +14,7 @@ class Mode(enum.Enum):
     """What the follower is doing."""
 
     ACQUIRING = "acquiring"
-    """Nobody has been picked yet: stand still."""
+    """No person has been picked yet: stand still."""
     FOLLOWING = "following"
     """The person is in sight."""
     COASTING = "coasting"

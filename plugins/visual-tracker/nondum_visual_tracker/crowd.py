@@ -49,7 +49,7 @@ class Crowd:
         return replace(self, tracks=remembered, counted=self.counted + len(fresh)).checked()
 
     def picked(self, azimuth: float) -> Crowd:
-        """Pick the person nearest `azimuth` where nobody is followed; flickers are no persons."""
+        """Pick the person nearest `azimuth` if none is followed; flickers are no persons."""
         people = [track for track in self.tracks if track.hits >= CONFIRMED_HITS]
         if self.target_number is not None or not people:
             return self
@@ -68,7 +68,7 @@ class Crowd:
 def _matched(
     expected: Sequence[Track], sightings: Sequence[Sighting]
 ) -> tuple[list[Track], list[Sighting]]:
-    """The tracks after their sightings, and the sightings of nobody known."""
+    """The tracks after their sightings, and the sightings that belong to no track."""
     pairs = assigned([[t.distance(sight) for sight in sightings] for t in expected], gate=GATE)
     known = [
         track.seen(sightings[pairs[i]]) if i in pairs else track for i, track in enumerate(expected)

@@ -1,4 +1,4 @@
-"""The follower: sightings and headings in, commands out, no clock of its own."""
+"""The follower: sightings and headings in, commands out; it reads no clock."""
 
 from __future__ import annotations
 

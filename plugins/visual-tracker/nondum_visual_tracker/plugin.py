@@ -77,7 +77,7 @@ async def start(ctx: Context) -> None:
 async def track(ctx: Context, u: str, d: str, o: str, h: str, c: str) -> None:
     """Pick the person nearest straight ahead, and steer to keep them there, until halted.
 
-    Established when somebody was picked. Fails with TARGET_LOST when nobody was seen for
+    Established when a person was picked. Fails with TARGET_LOST when no person was seen for
     `give_up_s`, and with FRAME_UNKNOWN when the camera's mount is not known.
     """
     settings = parse_settings(Settings, ctx.settings, where=ctx.component)
@@ -107,7 +107,7 @@ async def track(ctx: Context, u: str, d: str, o: str, h: str, c: str) -> None:
 async def watch(ctx: Context, u: str, d: str, h: str, c: str) -> None:
     """Wait until somebody has been seen for certain.
 
-    Fails with TARGET_LOST when nobody was within `give_up_s`, and with FRAME_UNKNOWN.
+    Fails with TARGET_LOST when no person was seen within `give_up_s`, and with FRAME_UNKNOWN.
     """
     settings = parse_settings(Settings, ctx.settings, where=ctx.component)
     eye, crowd = _Eye(ctx, d, c, settings, body=h), Crowd(memory_s=settings.coast_s)

@@ -33,7 +33,7 @@ def test_person_nearest_ahead_is_picked() -> None:
     assert abs(found - 3) < 0.5
 
 
-def test_flicker_is_nobody() -> None:
+def test_flicker_is_not_taken_for_a_person() -> None:
     assert watched([[10], [0, 10], [10]]).target == watched([[10], [10], [10]]).target
     assert watched([[0]]).target is None
 

@@ -32,7 +32,7 @@ def look(detections: Detections, depth: Depth | None = None) -> tuple[Sighting, 
 def depth(
     metres: float, *, encoding: str = "16UC1", stamp_s: float = 5.0, frame: str = "eye"
 ) -> Depth:
-    """A wall at one distance, with a hole in every other column."""
+    """A plane at one distance, with a hole in every other column."""
     code = "H" if encoding == "16UC1" else "f"
     value = round(metres * 1000) if encoding == "16UC1" else metres
     row = [value if x % 2 else 0 for x in range(160)]

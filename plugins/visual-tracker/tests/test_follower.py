@@ -53,7 +53,7 @@ class World:
         return (Sighting(azimuth - self.heading, self._height),)
 
 
-def test_body_turns_to_a_standing_person() -> None:
+def test_body_turns_to_a_still_person() -> None:
     world = World(lambda now: 0.4).run(4)
     assert world.heading == pytest.approx(0.4, abs=math.radians(1.5))
     assert abs(world.command.turn_rad_s) < 0.05
@@ -65,7 +65,7 @@ def test_body_keeps_up_with_a_walking_person(rate: float) -> None:
     assert world.heading == pytest.approx(rate * world.now_s, abs=math.radians(4))
 
 
-def test_nobody_in_sight_means_standing_still() -> None:
+def test_base_stays_still_with_no_one_in_sight() -> None:
     world = World(lambda now: None).run(10)
     assert world.modes == [Mode.ACQUIRING]
     assert world.heading == 0.0

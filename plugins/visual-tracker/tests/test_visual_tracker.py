@@ -23,7 +23,7 @@ EYE = "robot__cam__eye"
 CAMERA = CameraModel(640, 480, 500.0, 500.0, 320.0, 240.0)
 AHEAD = {EYE: ((0.0, 0.0, 0.4), (0.0, 0.0, 0.0))}
 PATIENT = {"coast_s": 60.0, "stop_s": 60.0}
-"""Nobody is forgotten between two images, however slow the machine is."""
+"""The tracker forgets no person between two images, however slow the machine is."""
 
 
 def person(azimuth: float) -> Detections:
@@ -32,7 +32,7 @@ def person(azimuth: float) -> Detections:
     return Detections(Header(frame_id=EYE), (found,), 640, 480, CAMERA)
 
 
-def nobody() -> Detections:
+def empty_view() -> Detections:
     return Detections(Header(frame_id=EYE), (), 640, 480, CAMERA)
 
 
@@ -65,7 +65,7 @@ def test_body_is_turned_towards_the_person(worker: Any, azimuth: float) -> None:
 def test_nothing_moves_and_nothing_is_claimed_before_somebody_is_seen(worker: Any) -> None:
     bench = worker(PLUGIN, mounts=AHEAD)
     call = track(bench)
-    bench.feed(nobody(), stream="people")
+    bench.feed(empty_view(), stream="people")
     assert all(bench.read("steering").angular == (0.0, 0.0, 0.0) for _ in range(5))
     assert call.state == "running"
 
@@ -93,7 +93,7 @@ def test_unknown_mount_fails(worker: Any) -> None:
     assert shown(bench, 0.0, track(bench)).wait().state == "failed"
 
 
-def test_nobody_for_long_fails(worker: Any) -> None:
+def test_track_fails_when_no_one_is_in_sight_for_long(worker: Any) -> None:
     bench = worker(PLUGIN, mounts=AHEAD, settings={"give_up_s": 0.2})
     track(bench).assert_failed("TARGET_LOST")
 
@@ -108,7 +108,7 @@ def test_watch_succeeds_when_somebody_is_seen_for_certain(worker: Any) -> None:
     call.assert_succeeded()
 
 
-def test_watch_fails_when_nobody_comes(worker: Any) -> None:
+def test_watch_fails_when_no_one_comes(worker: Any) -> None:
     bench = worker(PLUGIN, mounts=AHEAD, settings={"give_up_s": 0.2})
     call = bench.behave("watch", u="tracker", d="people", h=bench.host, c="person")
     call.assert_failed("TARGET_LOST")

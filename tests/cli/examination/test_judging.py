@@ -51,7 +51,7 @@ CARDS = " 0 [Loopback       ]: Loopback - Loopback\n                      Loopba
         (space.judge_free(900, 64, 4096), "warn", "quota_mb"),
         (space.judge_free(9000, 64, 4096), "ok", "9000 MB are free"),
         (drives.judge(Disk("sda", 9, True, Owner.DRIVE, "")), "ok", "read as a drive"),
-        (drives.judge(Disk("sda", 9, True, Owner.NOBODY, "has partitions")), "ok", "partitions"),
+        (drives.judge(Disk("sda", 9, True, Owner.NONE, "has partitions")), "ok", "partitions"),
         (drives.judge(Disk("sda", 9, True, Owner.HOST, "it is /srv")), "ok", "alone: it is /srv"),
         (drives.judge(Disk("sda", 9, True, Owner.SOMEBODY, "at /mnt")), "warn", "at /mnt unmount"),
         (

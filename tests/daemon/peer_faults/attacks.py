@@ -34,7 +34,7 @@ LONG, MORE, COMMAND = b"\x02", b"\x03", b"\x06"
 
 
 def unknown_keys(ip: str, port: int, key: str) -> Iterator[None]:
-    """Connect by CURVE, each time under a key that nobody knows."""
+    """Connect by CURVE, each time under a key that no host trusts."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     waiting: deque[tuple[zmq.Socket[bytes], zmq.Socket[bytes]]] = deque()
     while True:
@@ -43,14 +43,14 @@ def unknown_keys(ip: str, port: int, key: str) -> Iterator[None]:
         sock.linger = 0
         sock.curve_publickey, sock.curve_secretkey = keys.public.encode(), keys.secret.encode()
         sock.curve_serverkey = key.encode()
-        ears = sock.get_monitor_socket(zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_DISCONNECTED)
+        monitor = sock.get_monitor_socket(zmq.EVENT_HANDSHAKE_FAILED_AUTH | zmq.EVENT_DISCONNECTED)
         sock.connect(f"tcp://{ip}:{port}")
-        waiting.append((sock, ears))
+        waiting.append((sock, monitor))
         if len(waiting) > AT_ONCE:
-            sock, ears = waiting.popleft()
-            ears.poll(1000)  # it is turned away, and not just gone before that
+            sock, monitor = waiting.popleft()
+            monitor.poll(1000)  # it is turned away, and not just gone before that
             sock.disable_monitor()
-            ears.close(0)
+            monitor.close(0)
             sock.close(0)
         yield
 

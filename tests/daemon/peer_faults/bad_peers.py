@@ -91,14 +91,14 @@ class Bad:
         """Connect, and be let in. Raises `OSError` when it is not."""
         self.socket = self.made()
         self.socket.reconnect_ivl = 1 << 30
-        self.ears = self.socket.get_monitor_socket(
+        self.monitor = self.socket.get_monitor_socket(
             zmq.EVENT_DISCONNECTED | zmq.EVENT_HANDSHAKE_FAILED_AUTH
         )
         self.socket.connect(self.endpoint)
         self.say(hello or self.hello())
         poller = zmq.Poller()
         poller.register(self.socket, zmq.POLLIN)
-        poller.register(self.ears, zmq.POLLIN)
+        poller.register(self.monitor, zmq.POLLIN)
         found = dict(poller.poll(PATIENCE_MS))
         if self.socket not in found or not isinstance(decode(self.socket.recv()), Welcome):
             raise ConnectionRefusedError
@@ -106,7 +106,7 @@ class Bad:
     def hang_up(self) -> None:
         """End it."""
         self.socket.disable_monitor()
-        self.ears.close(0)
+        self.monitor.close(0)
         self.socket.close(0)
 
     def say(self, message: Message) -> None:
@@ -115,15 +115,15 @@ class Bad:
 
     def live(self, state: State | None = None) -> None:
         """Give a sign of life, when it is time to. Raises `ConnectionResetError`."""
-        if self.ears.poll(0):
+        if self.monitor.poll(0):
             raise ConnectionResetError
         if time.monotonic() - self.beaten_s > BEAT_S:
             self.beaten_s = time.monotonic()
             self.beats += 1
             self.say(Ping(self.beats, int(BEAT_S * 1000), state))
 
-    def heard(self, wait_s: float = 0.0) -> Iterator[Message]:
-        """What has come."""
+    def received(self, wait_s: float = 0.0) -> Iterator[Message]:
+        """The messages that have arrived."""
         while self.socket.poll(int(wait_s * 1000)):
             wait_s = 0.0
             try:
@@ -140,7 +140,7 @@ def calls(bad: Bad) -> Iterator[None]:
         bad.live()
         bad.say(Request(number, number, 60_000, "echo", {"text": "x" * 100}))
         if number % 100 == 0:
-            list(bad.heard())
+            list(bad.received())
         yield
 
 
@@ -152,7 +152,7 @@ def endless_calls(bad: Bad) -> Iterator[None]:
         bad.live()
         args = {"piece": f"bad-{number}", "for_s": 1000}
         bad.say(Request(number, 1, 10_000_000, "work.stop", args))
-        list(bad.heard(0.001))
+        list(bad.received(0.001))
         yield
 
 
@@ -176,19 +176,19 @@ def changes(bad: Bad) -> Iterator[None]:
             bad.say(Notice("fleet.changed", chunk.to_body()))
         told = ledger.state.revision
         if number % 20 == 0:
-            for message in bad.heard():
+            for message in bad.received():
                 if isinstance(message, Request) and message.method == "fleet.read":
                     bad.say(Reply(message.number, ledger.whole()[-1].to_body()))
         yield
 
 
 def oversized(bad: Bad) -> Iterator[None]:
-    """Answer whoever asks for the catalogue with more than any host may have."""
+    """Answer requests for the catalogue with more than any host may have."""
     state = State(9, bytes(8))
     entry = pack({"text": "x" * (MAX_ENTRY - 100)}, MAX_ENTRY)
     while True:
         bad.live(state)
-        for message in bad.heard(BEAT_S):
+        for message in bad.received(BEAT_S):
             if isinstance(message, Request) and message.method == "fleet.read":
                 for part in range(127):
                     chunk = Chunk(EPOCH, 0, state, part, 128, {f"fact/{part}": entry})
@@ -199,19 +199,19 @@ def oversized(bad: Bad) -> Iterator[None]:
 
 
 def mute(bad: Bad) -> Iterator[None]:
-    """Have news all the time, and never answer who asks for them."""
+    """Have news all the time, and answer no request for them."""
     while True:
         bad.live(State(bad.beats + 1, bytes(8)))
-        list(bad.heard(BEAT_S))
+        list(bad.received(BEAT_S))
         yield
 
 
 def late(bad: Bad) -> Iterator[None]:
-    """Answer when nobody waits any more, twice, and what nobody has asked."""
+    """Answer each call after its deadline, twice, and answer calls that no host has made."""
     waiting: deque[tuple[float, Request]] = deque()
     while True:
         bad.live()
-        for message in bad.heard(BEAT_S):
+        for message in bad.received(BEAT_S):
             if isinstance(message, Request) and message.method == "echo":
                 waiting.append((time.monotonic() + LATE_S, message))
         while waiting and waiting[0][0] < time.monotonic():
@@ -241,7 +241,7 @@ def reads(bad: Bad) -> Iterator[None]:
         bad.live()
         bad.say(Request(number, number, 60_000, "fleet.read", {"epoch": 0, "revision": 0}))
         if number % 10 == 0:
-            list(bad.heard())
+            list(bad.received())
         yield
 
 
@@ -262,7 +262,7 @@ def endless_parts(bad: Bad) -> Iterator[None]:
     for _ in range(PARTS):
         bad.socket.send(part, zmq.SNDMORE, copy=False)
     bad.socket.send(b"end")  # only now ZeroMQ begins to send
-    while not bad.ears.poll(1000):
+    while not bad.monitor.poll(1000):
         yield
     raise ConnectionResetError
 
@@ -275,7 +275,7 @@ def drip(bad: Bad) -> Iterator[None]:
         with contextlib.suppress(OSError):
             bad.dial()
             bad.say(Notice("values", {"text": "x" * 100_000}))
-            while not bad.ears.poll(1000):
+            while not bad.monitor.poll(1000):
                 yield
         bad.hang_up()
         time.sleep(BEAT_S)
@@ -287,7 +287,7 @@ def half_open(bad: Bad) -> Iterator[None]:
     try:
         while True:
             bad.live()
-            list(bad.heard())
+            list(bad.received())
             if len(sockets) < HALF_OPEN:
                 sockets.append(bad.made())
                 sockets[-1].connect(bad.endpoint)
@@ -323,7 +323,7 @@ def deltas(bad: Bad) -> Iterator[None]:
     for revision in itertools.count(1):
         state = State(revision, digest.to_bytes(8))
         bad.live(state)
-        for message in bad.heard(0.02):
+        for message in bad.received(0.02):
             if isinstance(message, Request) and message.method == "fleet.read":
                 *first, last = cut(EPOCH, 0, state, entries)
                 for chunk in first:

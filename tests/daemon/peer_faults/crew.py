@@ -1,4 +1,4 @@
-"""Hosts on machines of their own, all on one switch, and what tests do with them."""
+"""Hosts, one on each machine, all on one switch, and what tests do with them."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Crew:
             taken(answer)
 
     def all_meet(self, *parts: Sequence[Member]) -> None:
-        """Wait until all hosts of each part have each other for peers, and nobody else."""
+        """Wait until all hosts of each part have each other for peers, and no other host."""
         answers = []
         for part in parts or (self.members,):
             for member in part:
@@ -148,7 +148,7 @@ class Crew:
 
 
 class Trusting:
-    """Who trusts whom: all hosts of these names each other, by pairing or by a fleet."""
+    """Trust between hosts: all of these names trust each other, by pairing or by a fleet."""
 
     def __init__(self, names: Sequence[str], *, by_fleet: bool = False) -> None:
         self.keys = {name: HostKeys.generate() for name in names}
@@ -156,7 +156,7 @@ class Trusting:
         self.paired = {} if by_fleet else {one.public: name for name, one in self.keys.items()}
 
     def config(self, name: str, keys: HostKeys) -> Told:
-        """What a host is told of it; a certificate is good from yesterday, for thirty days."""
+        """A host's configuration of trust; certificates are valid for 31 days from yesterday."""
         return {
             "paired": {key: name for key, name in self.paired.items() if key != keys.public},
             "fleets": [self.fleet] if self.fleet else [],

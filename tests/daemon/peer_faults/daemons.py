@@ -1,4 +1,4 @@
-"""Whole hosts on machines of their own, all on one switch, that are paired with each other."""
+"""Whole hosts, one on each machine, all on one switch, that are paired with each other."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""One host of a fleet, on a machine of its own: it changes its catalogue, calls others, serves them
-by writing down what it does, and tells what it sees.
+"""One host of a fleet, on its own machine: it changes its catalogue, calls others, serves their
+calls by writing down what it does, and reports what it sees.
 
 python -m tests.daemon.peer_faults.member CONFIG     # until it is told to leave
 
@@ -71,26 +71,26 @@ class Works:
         """Write to a file of this life."""
         self._log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL)
 
-    def serve(self, errand: IncomingCall) -> Body | Awaitable[Body]:
-        if errand.method == "echo":
-            return errand.args
-        if errand.method in ENDINGS:
-            return self._work(errand)
-        raise CallFailed(Problem("NO_METHOD", errand.method))
+    def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
+        if incoming.method == "echo":
+            return incoming.args
+        if incoming.method in ENDINGS:
+            return self._work(incoming)
+        raise CallFailed(Problem("NO_METHOD", incoming.method))
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
         self.noticed += 1
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
-        return ENDINGS.get(errand.method, Lease.STOP)
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
+        return ENDINGS.get(incoming.method, Lease.STOP)
 
-    async def _work(self, errand: IncomingCall) -> Body:
-        piece = errand.args["piece"]
+    async def _work(self, incoming: IncomingCall) -> Body:
+        piece = incoming.args["piece"]
         self.running.add(piece)
         self.idle.clear()
         self._write("begin", piece)
         try:
-            await asyncio.sleep(errand.args["for_s"])
+            await asyncio.sleep(incoming.args["for_s"])
         finally:
             self._write("end", piece)
             self.running.discard(piece)
@@ -222,7 +222,7 @@ class Sees:
 
 
 class Complaints(logging.Handler):
-    """Tells of errors, and of exceptions that nobody was there to catch: there may be none."""
+    """Reports errors and uncaught exceptions: a test fails if there are any."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -289,7 +289,7 @@ class Member:
         return {}
 
     async def order_rest(self) -> Mapping[str, Any]:
-        """Call nobody any more, and wait for the answers: what became of the calls."""
+        """Make no more calls, and wait for the answers; the results of the calls."""
         await self._asks.stop()
         return {"answered": self._asks.answered, "failed": self._asks.failed}
 

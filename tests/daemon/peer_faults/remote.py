@@ -1,4 +1,4 @@
-"""A host on a machine of its own, as tests see it."""
+"""A host on another machine, as tests see it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A host that was let in and goes bad: it is its own loss, and nobody else's."""
+"""A host that was let in and goes bad: it loses its peers, and the others go on."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_flood_is_cut(kind: str, hosts: Crew) -> None:
     with measured(rover, mule) as figures, bad_peer(hosts, kind, mule):
         until_refused(mule, "FLOODING", 5)
         mule.ask("miss", peer="bad")
-        others_go_on(hosts, kind)
+        good_hosts_go_on(hosts, kind)
     assert figures.growth_kb < GROWTH_KB
 
 
@@ -65,7 +65,7 @@ def test_catalogue_of_no_host_is_cut(hosts: Crew) -> None:
     rover, mule, _ = hosts
     with measured(rover, mule) as figures, bad_peer(hosts, "oversized", mule):
         until_refused(mule, "GARBAGE", 3)
-        others_go_on(hosts, "oversized")
+        good_hosts_go_on(hosts, "oversized")
     assert figures.growth_kb < GROWTH_KB
 
 
@@ -73,7 +73,7 @@ def test_catalogue_of_no_host_is_cut(hosts: Crew) -> None:
 def test_bad_manners_are_bounded(kind: str, hosts: Crew) -> None:
     rover, mule, _ = hosts
     with measured(rover, mule) as figures, bad_peer(hosts, kind, mule):
-        others_go_on(hosts, kind)
+        good_hosts_go_on(hosts, kind)
         status = mule.ask("status")
         assert status["running"] <= 256
     assert figures.growth_kb < GROWTH_KB
@@ -89,7 +89,7 @@ def test_late_answers_are_no_answers(hosts: Crew) -> None:
             call = {"peer": "bad", "method": "echo", "args": {}, "deadline_s": 0.5}
             assert mule.ask("call", **call)["failure"] == "DEADLINE"
         assert "bad" in mule.ask("status")["peers"]
-        others_go_on(hosts, "late")
+        good_hosts_go_on(hosts, "late")
 
 
 def test_message_without_end_is_cut_before_it_fills_the_memory(hosts: Crew) -> None:
@@ -98,15 +98,15 @@ def test_message_without_end_is_cut_before_it_fills_the_memory(hosts: Crew) -> N
         until_refused(mule, "ENDLESS", 1)
         mule.ask("miss", peer="bad")
         until_refused(mule, "FLOODING", 1)  # it has come back, and is not let in
-        others_go_on(hosts, "endless_parts")
+        good_hosts_go_on(hosts, "endless_parts")
     assert figures.peak_kb < PEAK_KB
 
 
-def test_byte_at_a_time_is_nobody_else_s_wait(hosts: Crew) -> None:
+def test_byte_at_a_time_makes_no_other_host_wait(hosts: Crew) -> None:
     rover, mule, _ = hosts
     with measured(rover, mule) as figures, bad_peer(hosts, "drip", mule):
         until_lost(mule, "SILENT", 2)
-        others_go_on(hosts, "drip")
+        good_hosts_go_on(hosts, "drip")
     assert figures.growth_kb < GROWTH_KB
 
 
@@ -117,7 +117,7 @@ def test_connections_of_a_proved_key_that_never_greet_are_bounded(hosts: Crew) -
         for _ in range(SAMPLES):
             until_refused(mule, "CROWDED", 50)
             held.append(mule.descriptors())
-        others_go_on(hosts, "half_open")
+        good_hosts_go_on(hosts, "half_open")
     assert statistics.median(held) < DESCRIPTORS, held
     assert figures.growth_kb < GROWTH_KB
 
@@ -127,7 +127,7 @@ def test_proved_key_is_one_host_whatever_it_calls_itself(hosts: Crew) -> None:
     with measured(rover, mule) as figures, bad_peer(hosts, "names", mule):
         until_refused(mule, "NOT_PROVED", 20)
         until_refused(mule, "FLOODING", 5)
-        others_go_on(hosts, "names")
+        good_hosts_go_on(hosts, "names")
         assert set(mule.ask("status")["met"]) == {"bad", "base", "rover"}
     assert figures.growth_kb < GROWTH_KB
 
@@ -136,7 +136,7 @@ def test_catalogue_that_grows_beyond_bounds_by_changes_is_cut(hosts: Crew) -> No
     rover, mule, _ = hosts
     with measured(rover, mule) as figures, bad_peer(hosts, "deltas", mule):
         until_refused(mule, "GARBAGE", 3)
-        others_go_on(hosts, "deltas")
+        good_hosts_go_on(hosts, "deltas")
     assert figures.growth_kb < GROWTH_KB
 
 
@@ -148,7 +148,7 @@ def certified(seed: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[C
         fleet.clear()
 
 
-def test_certificates_that_do_not_hold_let_nobody_in_nor_a_revoked_one_again(
+def test_invalid_certificates_let_no_host_in_nor_a_revoked_one_again(
     certified: Crew,
 ) -> None:
     rover, mule, _ = certified
@@ -157,13 +157,13 @@ def test_certificates_that_do_not_hold_let_nobody_in_nor_a_revoked_one_again(
         mule.ask("revoke", key=KEYS["certificates"].public)
         mule.ask("miss", peer="bad")
         until_refused(mule, "REVOKED", 10)
-        others_go_on(certified, "certificates")
+        good_hosts_go_on(certified, "certificates")
         assert "bad" not in mule.ask("status")["peers"]
     assert figures.growth_kb < GROWTH_KB
 
 
 def until_lost(host: Member, reason: str, times: int) -> None:
-    """Wait until a host has lost peers so many more times for that reason."""
+    """Wait until a host has lost peers `times` more times for that reason."""
 
     def lost() -> dict[str, int]:
         found: dict[str, int] = host.ask("status")["lost"]
@@ -174,7 +174,7 @@ def until_lost(host: Member, reason: str, times: int) -> None:
 
 
 def until_refused(host: Member, reason: str, times: int) -> None:
-    """Wait until a host has refused so many more connections for that reason."""
+    """Wait until a host has refused `times` more connections for that reason."""
 
     def refusals() -> dict[str, int]:
         found: dict[str, int] = host.ask("status")["refused"]
@@ -184,7 +184,7 @@ def until_refused(host: Member, reason: str, times: int) -> None:
     until(f"{reason}", lambda: refusals().get(reason, 0) >= wanted, evidence=refusals)
 
 
-def others_go_on(hosts: Crew, meanwhile: str) -> None:
+def good_hosts_go_on(hosts: Crew, meanwhile: str) -> None:
     """Good hosts' catalogues are known, and one that was killed comes back."""
     rover, mule, base = hosts
     for number in range(CHANGES):

@@ -49,8 +49,8 @@ def storm(hosts: Crew, flaps: int) -> None:
     """Pull and put back every host's cable so often while all are at work, then let them rest."""
     began_s = time.monotonic()
     hosts.live(change_s=0.03, ask_s=0.05)
-    with ThreadPoolExecutor(len(hosts.members)) as hands:
-        list(hands.map(lambda member: flap(member, flaps, hosts.seed), hosts))
+    with ThreadPoolExecutor(len(hosts.members)) as pool:
+        list(pool.map(lambda member: flap(member, flaps, hosts.seed), hosts))
     note(f"{flaps} flaps each in {time.monotonic() - began_s:.0f} s")
     hosts.rest()
 

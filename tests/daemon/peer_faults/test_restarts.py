@@ -51,14 +51,14 @@ def test_killed_host_comes_back_with_what_it_tells_now(hosts: Crew) -> None:
     hosts.all_see({"rover": {}, "mule": {}, "base": {}})
 
 
-def test_host_that_starts_anew_before_its_death_is_noticed_does_nothing_twice(hosts: Crew) -> None:
+def test_host_that_restarts_before_its_death_is_noticed_does_nothing_twice(hosts: Crew) -> None:
     rover, mule, _ = hosts
     mule.ask("publish", changes=LAMP)
     hosts.all_see({"rover": {}, "mule": LAMP, "base": {}})
     call = rover.order("call", **work(mule.name, "work.finish"))
     rover.call(mule, "echo")  # what came before it has begun
     rover.forget()
-    mule.cable.pull()  # so that nobody hears of the end of its connections
+    mule.cable.pull()  # so that no peer sees its connections end
     mule.kill()
     mule.cable.put_back()
     mule.start()

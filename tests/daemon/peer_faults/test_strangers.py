@@ -1,4 +1,4 @@
-"""Strangers on the network, with all they have: nobody gets in, and the others' calls go on."""
+"""Attacks by hosts that are not trusted: none is let in, and the others' calls go on."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def hosts(fleet: Crew) -> Iterator[Crew]:
 
 @pytest.mark.parametrize("kind", REFUSED)
 @MANY
-def test_nobody_gets_in(many: int, kind: str, hosts: Crew) -> None:
+def test_no_stranger_gets_in(many: int, kind: str, hosts: Crew) -> None:
     rover, mule, base = hosts
     reasons = REFUSED[kind]
     with measured(rover, mule) as figures, attack(hosts, kind, mule):
@@ -75,7 +75,7 @@ def test_nobody_gets_in(many: int, kind: str, hosts: Crew) -> None:
     assert_no_stranger_is_in(mule)
 
 
-def test_lies_about_who_is_where_lead_nobody_astray(hosts: Crew) -> None:
+def test_spoofed_announcements_do_not_keep_hosts_apart(hosts: Crew) -> None:
     rover, mule, base = hosts
     with measured(rover, mule), attack(hosts, "spoofed", mule):
         base.kill()

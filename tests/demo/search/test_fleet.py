@@ -1,4 +1,4 @@
-"""Hosts of the demonstration's fleet are let in by each other, and by nobody else."""
+"""Hosts of the demonstration's fleet accept each other, and no other host accepts them."""
 
 from __future__ import annotations
 

@@ -15,13 +15,13 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> Person:
     return Person(tmp_path_factory.mktemp("person") / "voice", expects=(ALERT, *OTHER_SENTENCES))
 
 
-def heard(person: Person, words: str, folder: Path) -> tuple[str, ...]:
+def understood(person: Person, words: str, folder: Path) -> tuple[str, ...]:
     person.say(words, folder / "said.wav")
     return person.understood(folder / "said.wav")
 
 
 def test_alert_is_understood(person: Person, tmp_path: Path) -> None:
-    assert heard(person, "I can see a person.", tmp_path) == (ALERT,)
+    assert understood(person, "I can see a person.", tmp_path) == (ALERT,)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_alert_is_understood(person: Person, tmp_path: Path) -> None:
     ],
 )
 def test_other_sentences_are_no_alert(person: Person, words: str, tmp_path: Path) -> None:
-    assert ALERT not in heard(person, words, tmp_path)
+    assert ALERT not in understood(person, words, tmp_path)
 
 
 def test_file_is_there_only_once_it_is_whole(person: Person, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ def peers(text: str) -> PeersSection:
     return parse(text, "host.toml", HostConfig()).peers
 
 
-def test_hosts_on_loopback_know_each_others_ports_and_not_their_own(tmp_path: Path) -> None:
+def test_hosts_on_loopback_are_configured_with_all_ports_but_their_own(tmp_path: Path) -> None:
     with site(tmp_path, NAMES, is_loopback=True) as where:
         assert isinstance(where, Loopback)
         found = {name: peers(where.prepare(name, tmp_path / name)) for name in NAMES}
@@ -31,8 +31,8 @@ def test_hosts_on_a_network_are_told_nothing_but_to_look(tmp_path: Path) -> None
     assert "development mode" not in Lan.told
     with site(tmp_path, NAMES, is_loopback=False) as where:
         if isinstance(where, Loopback):  # no root: there are no namespaces to be had
-            assert where.inside("rover") == ()
+            assert where.command_prefix("rover") == ()
             return
         section = peers(where.prepare("rover", tmp_path / "rover"))
         assert (section.development, section.discover, section.static) == (False, True, ())
-        assert where.inside("rover") != where.inside("mule")
+        assert where.command_prefix("rover") != where.command_prefix("mule")

@@ -12,7 +12,7 @@ DOMAIN = """\
 ; a camera's camera
 (define (domain Camera)
   (:requirements :strips :typing)
-  (:types lens - camera pane door - (either object place))
+  (:types lens - camera pane hatch - (either object place))
   (:constants camera - lens)
   (:predicates (seen ?x - lens ?y) (bright))
   (:valued seen) (:functional bright)
@@ -37,7 +37,7 @@ def test_one_word_may_play_every_part() -> None:
 
 def test_types_are_found_on_both_sides_of_the_dash() -> None:
     assert found(Part.TYPE) == [
-        *("lens", "camera", "pane", "door", "object", "place"),
+        *("lens", "camera", "pane", "hatch", "object", "place"),
         *("lens", "lens", "camera", "lens", "lens"),
     ]
 

@@ -112,7 +112,7 @@ def slot():
 
 
 def night(folder: Path, *, plugin: str = PLUGIN, domain: str = DOMAIN) -> list[Path]:
-    """A plugin with words of its own, and a library that names its slot."""
+    """A plugin with its own words, and a library that names its slot."""
     files = {
         "night/pyproject.toml": PROJECT,
         "night/payload.toml": PAYLOAD,

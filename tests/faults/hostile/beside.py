@@ -38,7 +38,7 @@ def trusting(name: str, code: str, write: Write) -> HostileDrive:
 
 
 def peering(name: str, write: Write) -> HostileDrive:
-    """A payload that works, beside what may be certificates: nobody's here, so nothing is told."""
+    """A payload that works, beside certificates for other hosts, or none: no effect here."""
     return HostileDrive(f"peers-{name}", "", sound_beside(folder(PEERS, write)))
 
 
@@ -100,7 +100,7 @@ def beside_a_changed_one(bench: Bench) -> None:
     """One payload is well, and another has a changed file."""
     other = Bench(bench.drive, (bench.number + 1) * 1000 + 1, bench.canary, bench.sign)
     bench.sound()
-    other.draft().write(bench.drive, bench.sign)
+    other.payload_files().write(bench.drive, bench.sign)
     with (other.folder / "index.json").open("ab") as index:
         index.write(b" ")
 

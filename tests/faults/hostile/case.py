@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.faults.hostile.draft import Draft, Sign, draft, plain, unsigned
+from tests.faults.hostile.payload_files import PayloadFiles, Sign, plain, sound_payload, unsigned
 from tests.kit.payloads import make_payload
 
 from nondum.wheelhouse.format import contents
@@ -35,9 +35,9 @@ class Bench:
         """Where that payload lies."""
         return self.drive / "nondum" / self.payload_id
 
-    def draft(self) -> Draft:
-        """A sound payload, to be spoilt."""
-        return draft(self.payload_id)
+    def payload_files(self) -> PayloadFiles:
+        """The files of a sound payload, to be spoilt."""
+        return sound_payload(self.payload_id)
 
     def sound(self) -> None:
         """A payload that works."""
@@ -80,7 +80,7 @@ class HostileDrive:
         return is_told and active == (self.beside if self.code else max(1, self.beside))
 
 
-Spoil = Callable[[Draft], Draft]
+Spoil = Callable[[PayloadFiles], PayloadFiles]
 Tamper = Callable[[Bench], None]
 
 
@@ -88,7 +88,7 @@ def spoilt(name: str, code: str, spoil: Spoil) -> HostileDrive:
     """A payload that was wrong already when it was sealed."""
 
     def make(bench: Bench) -> None:
-        spoil(bench.draft()).write(bench.drive, bench.sign)
+        spoil(bench.payload_files()).write(bench.drive, bench.sign)
 
     return HostileDrive(name, code, make)
 
@@ -97,7 +97,7 @@ def tampered(name: str, code: str, tamper: Tamper) -> HostileDrive:
     """A sound drive that something was done to afterwards."""
 
     def make(bench: Bench) -> None:
-        bench.draft().write(bench.drive, bench.sign)
+        bench.payload_files().write(bench.drive, bench.sign)
         tamper(bench)
 
     return HostileDrive(name, code, make)
@@ -106,7 +106,7 @@ def tampered(name: str, code: str, tamper: Tamper) -> HostileDrive:
 def edited(name: str, code: str, path: str, old: str, new: str) -> HostileDrive:
     """A payload with other words in one of its files; `LOCK` is its lock."""
 
-    def spoil(made: Draft) -> Draft:
+    def spoil(made: PayloadFiles) -> PayloadFiles:
         where = made.lock if path == LOCK else path
         return made.edited(where, old.replace("ID", made.component), new)
 

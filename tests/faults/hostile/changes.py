@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from tests.faults.hostile.case import Bench, HostileDrive, spoilt, tampered
-from tests.faults.hostile.draft import Draft
+from tests.faults.hostile.payload_files import PayloadFiles
 
 MISMATCH, MISSING = "HASH_MISMATCH", "FILE_MISSING"
 
@@ -33,14 +33,14 @@ CHANGES: dict[str, Change] = {
 
 
 def changed(file: str, name: str, change: Change) -> HostileDrive:
-    def spoil(made: Draft) -> Draft:
+    def spoil(made: PayloadFiles) -> PayloadFiles:
         path = FILES[file](made)
         return replace(made, swapped={path: change(made.files[path])})
 
     return spoilt(f"{file}-{name}", MISMATCH, spoil)
 
 
-FILES: dict[str, Callable[[Draft], str]] = {
+FILES: dict[str, Callable[[PayloadFiles], str]] = {
     "manifest": lambda made: "payload.toml",
     "lock": lambda made: made.lock,
     "index": lambda made: "index.json",
@@ -48,18 +48,18 @@ FILES: dict[str, Callable[[Draft], str]] = {
 }
 
 
-def wheel_of(made: Draft) -> str:
+def wheel_of(made: PayloadFiles) -> str:
     """Path of the payload's only wheel."""
     return next(path for path in made.files if path.endswith(".whl"))
 
 
-def exchanged(made: Draft) -> Draft:
+def exchanged(made: PayloadFiles) -> PayloadFiles:
     """Each of two files is whole, and lies in the other's place."""
     one, other = "payload.toml", "index.json"
     return replace(made, swapped={one: made.files[other], other: made.files[one]})
 
 
-def of_another_release(made: Draft) -> Draft:
+def of_another_release(made: PayloadFiles) -> PayloadFiles:
     """The wheel and the lock of the next release, under the list of this one."""
     wheel = wheel_of(made)
     swapped = {wheel: made.files[wheel] + b"2", made.lock: made.files[made.lock] + b"\n"}
@@ -72,7 +72,7 @@ def sparse(bench: Bench) -> None:
         file.truncate(2**40)
 
 
-def unlisted(path: str) -> Callable[[Draft], Draft]:
+def unlisted(path: str) -> Callable[[PayloadFiles], PayloadFiles]:
     """A file that is on the drive and not in the list: it is not there for anybody."""
     return lambda made: replace(made.without(path), swapped={path: made.files[path]})
 

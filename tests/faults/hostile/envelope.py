@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from tests.faults.hostile.case import Bench, HostileDrive, spoilt, tampered
-from tests.faults.hostile.draft import LEFT_OUT, Draft
+from tests.faults.hostile.payload_files import LEFT_OUT, PayloadFiles
 
 HEADER, ENTRY, ENCODING = "CONTENTS_HEADER", "CONTENTS_ENTRY", "CONTENTS_ENCODING"
 SCHEMA = "SCHEMA_VERSION"
@@ -64,7 +64,7 @@ def release_last(data: bytes) -> bytes:
     return b"\n".join([*lines[:end], line, *lines[end:]])
 
 
-def many_files(made: Draft) -> Draft:
+def many_files(made: PayloadFiles) -> PayloadFiles:
     return replace(made, files={**made.files, **{f"notes/{n}.txt": b"" for n in range(512)}})
 
 

@@ -116,7 +116,7 @@ def only(path: str) -> Callable[[Bench], None]:
 
 
 def moved(to: str) -> Callable[[Bench], None]:
-    """The payload lies where nobody looks."""
+    """The payload lies where the host does not look."""
 
     def tamper(bench: Bench) -> None:
         target = bench.drive / to

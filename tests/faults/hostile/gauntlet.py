@@ -1,4 +1,4 @@
-"""All hostile drives through one daemon's life, beside payloads that nobody may disturb."""
+"""All hostile drives through one daemon's life, beside payloads that must work on undisturbed."""
 
 from __future__ import annotations
 
@@ -147,8 +147,8 @@ class Gauntlet:
                 self._pull(drive)
             for drive in batch:
                 self._gone(drive)
-            self._check_others()
-            self.host.views.clear()  # each is big, and nobody asks for them
+            self._check_healthy()
+            self.host.views.clear()  # each is big, and none is needed
         self.outcome.touched = [d.case.name for d in drives if not self._is_as_made(d)]
         self.outcome.controls = len(CONTROLS.findall((self.host.work / "daemon.log").read_bytes()))
         until(
@@ -159,7 +159,7 @@ class Gauntlet:
         )
 
     def _bring(self, name: str, part: Part) -> None:
-        """Have a benign payload at work, signed by whom the host trusts."""
+        """Have a benign payload at work, signed with a key that the host trusts."""
         drive = self.host.drive(name, part)
         sign_payload(drive / "nondum" / f"org.example.{name}", MAKER)
         self.host.plug(drive)
@@ -230,8 +230,8 @@ class Gauntlet:
 
         self.host.until(f"{drive.case.name} gone", is_gone, timeout_s=JUDGED_S)
 
-    def _check_others(self) -> None:
-        """Whoever is healthy works on, and nothing ran that should not."""
+    def _check_healthy(self) -> None:
+        """Healthy components work on, and nothing ran that should not."""
         assert self._at_work() == self._healthy
         self.host.until_goal(self._goal, "holds")
         self.outcome.canaries += self._canary.exists()

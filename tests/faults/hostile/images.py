@@ -103,7 +103,7 @@ def fats_that_differ(bench: Bench) -> None:
 
 
 def partitions(*entries: tuple[int, int]) -> Callable[[], bytes]:
-    """A table of partitions that begin at a sector and have so many, as a PC's first sector."""
+    """A PC's first sector with a table of partitions: for each, its first sector and its size."""
 
     def fill() -> bytes:
         rows = [struct.pack("<B3sB3sII", 0, bytes(3), 0x83, bytes(3), *entry) for entry in entries]

@@ -40,7 +40,7 @@ DRIVES: tuple[HostileDrive, ...] = (
     whole("index-of-tomorrow", INVALID, '{"format": 99, "components": {}}'),
     whole("index-without-components", INVALID, '{"format": 1}'),
     whole("index-components-a-list", INVALID, '{"format": 1, "components": []}'),
-    whole("index-of-nobody", INVALID, '{"format": 1, "components": {}}'),
+    whole("index-of-no-component", INVALID, '{"format": 1, "components": {}}'),
     whole("index-bomb-of-brackets", INVALID, "[" * 1_000_000),
     whole("index-bomb-of-braces", INVALID, '{"a":' * 500_000),
     whole("index-bomb-of-digits", INVALID, "9" * 1_000_000),

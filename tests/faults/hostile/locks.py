@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from tests.faults.hostile.case import LOCK, HostileDrive, edited, spoilt
 from tests.faults.hostile.changes import wheel_of
-from tests.faults.hostile.draft import Draft, plain, sha256
+from tests.faults.hostile.payload_files import PayloadFiles, plain, sha256
 from tests.kit.payloads import make_wheel
 
 NOT_WHEEL, PATH, INVALID, HASHES = "LOCK_NOT_WHEEL", "LOCK_PATH", "LOCK_INVALID", "LOCK_HASH"
@@ -31,25 +31,25 @@ def package(name: str, code: str, lines: str) -> HostileDrive:
 def path(name: str, to: str) -> HostileDrive:
     """Its wheel lies elsewhere."""
 
-    def spoil(made: Draft) -> Draft:
+    def spoil(made: PayloadFiles) -> PayloadFiles:
         wheel = wheel_of(made)
         return made.edited(made.lock, wheel, wheel.replace("wheels/", to))
 
     return spoilt(name, PATH, spoil)
 
 
-def wheel_line(name: str, code: str, old: Callable[[Draft], str], new: str) -> HostileDrive:
+def wheel_line(name: str, code: str, old: Callable[[PayloadFiles], str], new: str) -> HostileDrive:
     return spoilt(name, code, lambda made: made.edited(made.lock, old(made), new))
 
 
-def digest_of(made: Draft) -> str:
+def digest_of(made: PayloadFiles) -> str:
     return sha256(made.files[wheel_of(made)])
 
 
-def needing(requirement: str) -> Callable[[Draft], Draft]:
+def needing(requirement: str) -> Callable[[PayloadFiles], PayloadFiles]:
     """Its wheel needs what the lock has not."""
 
-    def spoil(made: Draft) -> Draft:
+    def spoil(made: PayloadFiles) -> PayloadFiles:
         import tempfile
         from pathlib import Path
 
@@ -71,10 +71,10 @@ def needing(requirement: str) -> Callable[[Draft], Draft]:
     return spoil
 
 
-def tagged(tag: str) -> Callable[[Draft], Draft]:
+def tagged(tag: str) -> Callable[[PayloadFiles], PayloadFiles]:
     """Its wheel says that it is for another machine."""
 
-    def spoil(made: Draft) -> Draft:
+    def spoil(made: PayloadFiles) -> PayloadFiles:
         where, data = wheel_of(made), made.files[wheel_of(made)]
         other = where.replace("py3-none-any", tag)
         renamed = made.without(where).with_file(other, data)

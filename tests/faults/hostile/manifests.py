@@ -1,11 +1,11 @@
-"""Manifests that are wrong, ask for too much, or were made to choke whoever reads them."""
+"""Manifests that are wrong, ask for too much, or were made to exhaust their reader."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from tests.faults.hostile.case import MANIFEST, HostileDrive, edited, spoilt
-from tests.faults.hostile.draft import Draft
+from tests.faults.hostile.payload_files import PayloadFiles
 
 TOML, KEY, VALUE, TWICE = "MANIFEST_TOML", "MANIFEST_KEY", "MANIFEST_VALUE", "MANIFEST_TWICE"
 
@@ -37,11 +37,11 @@ def named(name: str, value: str, code: str = VALUE) -> HostileDrive:
     return edited(name, code, MANIFEST, 'name = "Test"', f'name = "{value}"')
 
 
-def of_another(made: Draft) -> Draft:
+def of_another(made: PayloadFiles) -> PayloadFiles:
     return made.edited(MANIFEST, f'id = "{made.id}"', 'id = "org.example.innocent"')
 
 
-def same_twice(made: Draft) -> Draft:
+def same_twice(made: PayloadFiles) -> PayloadFiles:
     good = made.text(MANIFEST)
     return made.with_file(MANIFEST, good + good[good.index("[[component]]") :])
 

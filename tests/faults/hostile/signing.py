@@ -48,7 +48,7 @@ def signed(name: str, code: str, signature: Callable[[bytes], bytes | None]) -> 
     """A sound payload with another signature file, made over its contents list."""
 
     def make(bench: Bench) -> None:
-        bench.draft().write(bench.drive, signature)
+        bench.payload_files().write(bench.drive, signature)
 
     return HostileDrive(f"signature-{name}", code, make)
 

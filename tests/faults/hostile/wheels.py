@@ -6,7 +6,7 @@ from packaging.tags import sys_tags
 from packaging.utils import InvalidWheelFilename, parse_wheel_filename
 from tests.faults.hostile.case import Bench, HostileDrive
 from tests.faults.hostile.changes import wheel_of
-from tests.faults.hostile.draft import locked
+from tests.faults.hostile.payload_files import locked
 from tests.wheelhouse.hostile import WHEELS, HostileWheel
 
 
@@ -16,7 +16,7 @@ def carrying(wheel: HostileWheel) -> HostileDrive:
     def make(bench: Bench) -> None:
         data = wheel.build(bench.canary)
         name, version, _, _ = parse_wheel_filename(wheel.filename)
-        made = bench.draft()
+        made = bench.payload_files()
         made = made.without(wheel_of(made)).with_file(f"wheels/{wheel.filename}", data)
         lock = locked(wheel.filename, data, name=str(name), version=str(version))
         made = made.with_file(made.lock, lock)

@@ -83,7 +83,7 @@ async def test_backups_are_made_only_when_something_changed(tmp_path: Path) -> N
     await catalogue.close()
 
 
-async def test_reserve_takes_room_and_gives_it_back(tmp_path: Path) -> None:
+async def test_reserve_takes_disk_space_and_gives_it_back(tmp_path: Path) -> None:
     reserve = Reserve(tmp_path / "reserve")
     assert reserve.take()
     assert reserve.path.stat().st_blocks * 512 >= RESERVE_BYTES

@@ -77,8 +77,8 @@ def payload(key: str = "k1", step: Step = Step.ACTIVE) -> PayloadRecord:
         step=step,
         sources={"b": Path("/drives/b"), "a": Path("/drives/a")},
         phases={"seen": AT, "ready": Moment(2.5, 3.5)},
-        components=("eye", "ear--org-example-eye"),
-        renamed={"ear": "ear--org-example-eye"},
+        components=("eye", "lens--org-example-eye"),
+        renamed={"lens": "lens--org-example-eye"},
         problems=(PROBLEM,),
     )
 
@@ -166,7 +166,7 @@ FULL = HostState(
     former={"org.example.arm": former()},
     names={
         "org.example.eye": GivenNames(
-            {"eye": "eye", "ear": "ear--org-example-eye"}, {"eye": "eye--org-example-eye"}
+            {"eye": "eye", "lens": "lens--org-example-eye"}, {"eye": "eye--org-example-eye"}
         ),
     },
     tries={"k1": 2, "block:sdb1-7": 4},
@@ -240,7 +240,7 @@ async def test_journal_is_told_by_subject_and_in_order(tmp_path: Path) -> None:
 
 
 @pytest.mark.anyio
-async def test_entries_of_this_run_are_judged_by_the_clock_that_nobody_sets(tmp_path: Path) -> None:
+async def test_entries_of_this_run_are_judged_by_the_monotonic_clock(tmp_path: Path) -> None:
     """The time was set while it ran: what came before is of 1970."""
     async with opened(tmp_path) as catalogue:
         before = [
@@ -339,7 +339,7 @@ async def test_backup_takes_the_place_of_what_is_lost(
 
 
 @pytest.mark.anyio
-async def test_file_that_is_damaged_under_a_daemon_is_written_anew(tmp_path: Path) -> None:
+async def test_file_that_is_damaged_under_a_daemon_is_written_again(tmp_path: Path) -> None:
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(FULL, (entry(),))
     async with opened(tmp_path) as catalogue:
@@ -405,12 +405,12 @@ async def test_file_that_is_lost_before_it_is_connected_to_again_is_written_whol
 
 
 @pytest.mark.anyio
-async def test_file_that_cannot_be_begun_anew_at_once_is_written_whole_later(
+async def test_file_that_cannot_be_made_again_at_once_is_written_whole_later(
     tmp_path: Path,
 ) -> None:
     async with opened(tmp_path) as catalogue:
         await catalogue.commit(FULL, (entry(),))
-        await catalogue._run(catalogue._set_aside)  # and then there was no room for a new one
+        await catalogue._run(catalogue._set_aside)  # then the disk was full: no new one
         later = replace(FULL, revision=6)
         await catalogue.commit(later, (entry(),))
         assert catalogue.loss is not None
@@ -619,7 +619,7 @@ async def test_memory_that_cannot_be_read_stops_nothing(tmp_path: Path) -> None:
 @pytest.mark.anyio
 async def test_commit_is_whole_or_not_at_all(tmp_path: Path) -> None:
     async with opened(tmp_path) as catalogue:
-        orphan = replace(FULL, components={"eye": component(payload="nobody")})
+        orphan = replace(FULL, components={"eye": component(payload="none")})
         with pytest.raises(sqlite3.IntegrityError):
             await catalogue.commit(orphan, (entry(),))
         assert catalogue.state == HostState("spot")

@@ -60,7 +60,7 @@ def test_what_is_sound_is_read(reader: str, value: Any, read: Any) -> None:
         ("triple", [1, 2, "3"], "three finite numbers"),
     ],
 )
-def test_what_is_amiss_is_told(reader: str, value: Any, words: str) -> None:
+def test_wrong_argument_is_told(reader: str, value: Any, words: str) -> None:
     with pytest.raises(ProtocolViolation, match=r"CONTROL_ARGUMENT") as refused:
         READERS[reader](Arguments({"it": value}))
     assert words in str(refused.value)

@@ -104,7 +104,7 @@ async def test_an_answer_comes_back(tmp_path: Path) -> None:
     assert answer == {"words": "héllo"}
 
 
-async def test_the_socket_is_nobody_elses_from_its_first_moment(
+async def test_the_socket_is_private_from_its_first_moment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, seen, chmod = tmp_path / "control.sock", list[tuple[int, bool]](), os.chmod
@@ -288,7 +288,7 @@ async def test_a_daemon_that_goes_is_told_to_followers(tmp_path: Path) -> None:
             await following
 
 
-async def test_a_client_that_never_reads_harms_nobody(tmp_path: Path) -> None:
+async def test_a_client_that_never_reads_harms_no_other_client(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as deaf:
         async with serving(tmp_path / "control.sock"):
             deaf.connect(str(tmp_path / "control.sock"))
@@ -354,7 +354,7 @@ async def test_only_owner_and_group_may_open_it(tmp_path: Path) -> None:
 
 def test_no_daemon_is_told_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(HostUnreachable, match="nondum host run --user"):
-        ControlClient(tmp_path / "nobody.sock")
+        ControlClient(tmp_path / "missing.sock")
 
 
 @given(st.text(), st.dictionaries(st.text(), JSON))

@@ -49,7 +49,7 @@ async def test_progress_is_kept_until_the_step_is_done() -> None:
     assert news.progress("key") == Progress("copy", 10, 40)
     news.on_event(PayloadCopied("key"))
     assert news.progress("key") is None
-    assert news.progress(str(Path("nobody"))) is None
+    assert news.progress(str(Path("other"))) is None
 
 
 async def test_progress_is_told_at_a_pace_for_people() -> None:

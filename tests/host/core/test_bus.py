@@ -17,7 +17,7 @@ def faulty(event: Event) -> None:
     raise RuntimeError("no")
 
 
-async def test_faulty_listener_is_nobody_elses_trouble(caplog: pytest.LogCaptureFixture) -> None:
+async def test_error_of_a_listener_affects_no_other_one(caplog: pytest.LogCaptureFixture) -> None:
     bus, heard = Bus(RULES), list[Event]()
     bus.subscribe(faulty)
     bus.subscribe(heard.append)
@@ -25,7 +25,7 @@ async def test_faulty_listener_is_nobody_elses_trouble(caplog: pytest.LogCapture
         bus.emit(PlanMissing("1", ()))
     assert heard == [PlanMissing("1", ())]
     assert [record.message for record in caplog.records] == [
-        f"a listener is at fault over {heard[0].name}"
+        f"a listener raised an error at {heard[0].name}"
     ]
 
 

@@ -9,11 +9,11 @@ import sys
 
 from nondum.host.jobs import fork_server
 
-NOBODY = 65534
+UNPRIVILEGED = 65534
 
 if __name__ == "__main__":
-    if os.geteuid() == 0:  # whom no number bounds
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
+    if os.geteuid() == 0:  # RLIMIT_NPROC does not limit root
+        os.setgid(UNPRIVILEGED)
+        os.setuid(UNPRIVILEGED)
     resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
     fork_server.serve(socket.socket(fileno=int(sys.argv[2])))

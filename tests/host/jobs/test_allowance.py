@@ -15,7 +15,7 @@ from nondum.host.jobs.table import JOBS, find
 
 
 def in_a_process(code: str) -> subprocess.CompletedProcess[str]:
-    """Run code in an interpreter of its own, which may die of it."""
+    """Run code in a separate interpreter, which may die of it."""
     text = "from nondum.host.jobs import allowance\n" + textwrap.dedent(code)
     command = [sys.executable, "-c", text]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)

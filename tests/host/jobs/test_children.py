@@ -67,7 +67,7 @@ async def test_child_works_again_for_the_same_drive_only(tmp_path: Path) -> None
         assert pool.kept()["b"] != first
 
 
-def test_child_whose_daemon_was_killed_ends_in_silence(tmp_path: Path) -> None:
+def test_child_ends_in_silence_once_its_daemon_was_killed(tmp_path: Path) -> None:
     program = [sys.executable, "-c", "from nondum.host.jobs import child; child.work()"]
     daemon, requests = socket.socketpair()
     with requests, daemon:
@@ -137,7 +137,7 @@ async def test_child_that_computes_for_ever_is_told(tmp_path: Path) -> None:
 
 
 async def test_child_that_hangs_is_given_up(tmp_path: Path, clock: VirtualClock) -> None:
-    """A FIFO that nobody writes to stands for a disk that never answers."""
+    """A FIFO that no process writes to stands for a disk that never answers."""
     async with children() as pool:
         job = asyncio.create_task(pool.run("verify", staged_fifo(tmp_path)))
         await until_async("a child", pool.pids)
@@ -235,7 +235,7 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
         assert not pool.pids()
 
 
-async def test_child_whose_end_the_server_has_not_told_is_not_said_to_hang(
+async def test_child_is_not_said_to_hang_before_the_server_tells_its_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with children() as pool:

@@ -1,4 +1,4 @@
-"""What payloads run is compiled once they run, and nobody is worse off for it."""
+"""What payloads run is compiled once they run, and no payload is worse off for it."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ async def test_modules_that_do_not_compile_are_left_without(tmp_path: Path) -> N
         assert component.is_ready
 
 
-async def test_a_failure_hurts_nobody(tmp_path: Path) -> None:
+async def test_a_failure_hurts_no_payload(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     lamp(tmp_path / "other", id="torch", payload_id="org.example.torch")
     async with host_in_process(tmp_path) as host:

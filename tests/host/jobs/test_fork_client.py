@@ -81,7 +81,7 @@ async def test_killed_server_takes_its_processes_along() -> None:
         forked.close()
 
 
-async def test_killed_server_is_started_anew_with_a_warning(
+async def test_killed_server_is_started_again_with_a_warning(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async with fork_client() as client:
@@ -124,7 +124,7 @@ async def test_end_of_a_process_is_seen_while_the_server_has_no_time_to_tell_it(
         child.close()
 
 
-async def test_server_that_has_ended_prepares_for_nothing_and_is_started_anew() -> None:
+async def test_server_that_has_ended_prepares_for_nothing_and_is_started_again() -> None:
     async with fork_client() as client:
         await client.expect(JOB)
         former = server_of(client)
@@ -137,7 +137,7 @@ async def test_server_that_has_ended_prepares_for_nothing_and_is_started_anew() 
         forked.close()
 
 
-async def test_process_that_nobody_waits_for_any_more_is_killed() -> None:
+async def test_process_is_killed_once_nothing_waits_for_it() -> None:
     async with fork_client() as client:
         (await client.fork(JOB, START_S)).close()
         forking = asyncio.create_task(client.fork(JOB, START_S))
@@ -232,7 +232,7 @@ async def test_process_that_cannot_be_watched_is_none(watched: int) -> None:
         wanted.close()
 
 
-async def test_process_for_whose_pidfd_no_descriptor_is_left_costs_no_other_one() -> None:
+async def test_process_costs_no_other_one_where_no_descriptor_is_left_for_its_pidfd() -> None:
     async with fork_client() as client:
         other = await client.fork(JOB, START_S)
         server, before = server_of(client), open_descriptors()
@@ -251,7 +251,7 @@ async def test_process_for_whose_pidfd_no_descriptor_is_left_costs_no_other_one(
         other.close()
 
 
-def test_answer_whose_pidfd_finds_no_room_says_so() -> None:
+def test_answer_says_so_where_no_descriptor_is_left_for_its_pidfd() -> None:
     channel, of_server = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with channel, of_server:
         socket.send_fds(of_server, [b"7"], [of_server.fileno()])

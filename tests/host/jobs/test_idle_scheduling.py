@@ -29,7 +29,7 @@ class Work:
         return "done"
 
 
-async def test_work_is_done_when_it_is_quiet() -> None:
+async def test_work_is_done_when_nothing_is_urgent() -> None:
     work = Work()
     work.go.set()
     assert await IdleScheduler(settled_s=0.0).run(work) == "done"

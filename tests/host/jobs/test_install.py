@@ -25,7 +25,7 @@ def test_what_was_damaged_in_the_store_is_not_installed(tmp_path: Path) -> None:
         "reserve_mb": 0,
         "confinement": "none",
         "allow_unsigned": True,
-        "room": None,
+        "headroom": None,
     }
     assert install(arguments, told)["fresh"]
     assert not install(arguments, told)["fresh"]

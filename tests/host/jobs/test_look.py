@@ -21,7 +21,7 @@ from nondum.wheelhouse.payload.memory import Promised
 from nondum.wheelhouse.trust import trust_text
 
 ALICE = Key("alice")
-ROOM = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
+HEADROOM = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
 
 
 def rules(tmp_path: Path) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def rules(tmp_path: Path) -> dict[str, Any]:
         "method": "store",
         "reserve_mb": 0,
         "allow_unsigned": True,
-        "room": ROOM,
+        "headroom": HEADROOM,
     }
 
 
@@ -98,7 +98,7 @@ def test_version_without_end_takes_no_other_payload_of_the_drive_along(tmp_path:
     assert codes == [["CONTENTS_HEADER"], []]
 
 
-def test_payload_that_nobody_signed_is_neither_parsed_nor_copied(tmp_path: Path) -> None:
+def test_unsigned_payload_is_neither_parsed_nor_copied(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive")
     (folder / "CONTENTS").write_bytes(b"\xff")
     assert found_on(tmp_path / "drive", allow_unsigned=False) == ["SIG_MISSING"]

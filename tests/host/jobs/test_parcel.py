@@ -33,8 +33,8 @@ def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
 
 def judge(folder: Path, state: Path, **more: Any) -> dict[str, Any]:
     rules = {"confinement": "none", "method": "store", "reserve_mb": 0, "allow_unsigned": True}
-    room = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
-    given = {"folder": str(folder), "store": str(state / "store"), "room": room, **rules}
+    headroom = {"promised": asdict(Promised()), "freed_mb": 0, "freed_gpu_mb": 0}
+    given = {"folder": str(folder), "store": str(state / "store"), "headroom": headroom, **rules}
     return parcel.judge(given | more, told)
 
 
@@ -109,12 +109,12 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, requires: str, refusal: st
     assert code(judge, lamp(tmp_path / "drive", requires=requires), tmp_path) == refusal
 
 
-def test_what_is_promised_to_others_is_not_there(tmp_path: Path) -> None:
+def test_memory_that_is_promised_to_other_payloads_is_not_available(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive", requires="memory_mb = 1")
     promised = asdict(Promised(10**9, 10**9, holders=("org.example.other",)))
-    room = {"promised": promised, "freed_mb": 0, "freed_gpu_mb": 0}
+    headroom = {"promised": promised, "freed_mb": 0, "freed_gpu_mb": 0}
     assert judge(folder, tmp_path)
-    assert code(judge, folder, tmp_path, room=room) == "NO_MEMORY"
+    assert code(judge, folder, tmp_path, headroom=headroom) == "NO_MEMORY"
 
 
 def test_more_than_is_read_to_judge_is_refused(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_payload_for_a_newer_nondum_is_not_fetched(tmp_path: Path) -> None:
     assert code(judge, contents.parent, tmp_path) == "NONDUM_VERSION"
 
 
-def test_what_is_fetched_needs_room_beside_what_is_made_of_it(
+def test_fetched_files_need_disk_space_beside_what_is_made_of_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = lamp(tmp_path / "drive", requires="disk_mb = 100")

@@ -1,4 +1,4 @@
-"""A few at a time, in order, and whoever waits knows how many are before it."""
+"""A few at a time, in order, and each that waits knows how many are before it."""
 
 from __future__ import annotations
 

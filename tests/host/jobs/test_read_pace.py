@@ -26,7 +26,7 @@ def copied(pieces: Iterable[tuple[float, int]]) -> int:
     return told[-1]
 
 
-def test_slow_but_steady_drive_is_borne() -> None:
+def test_slow_drive_that_keeps_the_least_pace_is_read_to_its_end() -> None:
     assert copied([(1.0, 2 * LEAST_BYTES_S)] * 100) == 200 * LEAST_BYTES_S
 
 

@@ -173,7 +173,7 @@ def test_worker_that_restarts_is_not_ready_meanwhile() -> None:
     assert after(again, state=state)[0].components["eye"].state is ComponentState.READY
 
 
-def test_why_a_worker_ended_stays_with_its_component_until_the_next_one_is_steady() -> None:
+def test_why_a_worker_ended_stays_with_its_component_until_the_next_one_has_lasted() -> None:
     ended = events.WorkerExited("eye", "it hung", problem=PROBLEM)
     again = events.WorkerReady("eye", PluginDescription("eye", "1.0"))
     state, _ = after(ended, again, state=active())

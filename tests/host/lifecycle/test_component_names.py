@@ -48,7 +48,7 @@ def test_its_workers_are_started_by_that_name() -> None:
     assert effects.ClearPayload("k2", (OTHER,)) in done
 
 
-def test_a_payload_whose_workers_still_end_holds_its_names() -> None:
+def test_a_payload_holds_its_names_until_its_workers_have_ended() -> None:
     state, _ = after(events.DriveRemoved("a"), drive("b"), *second()[:3], state=active())
     assert state.payloads["k2"].components == (OTHER,)
 

@@ -90,7 +90,7 @@ def numbered(number: int, mark: str = "Acme-0042") -> events.DriveInserted:
     return events.DriveInserted(f"sda-{number}", Path("/mounts"), "block", mark=mark)
 
 
-def test_drive_is_left_alone_after_the_machine_was_started_anew() -> None:
+def test_drive_is_left_alone_after_the_machine_has_started_again() -> None:
     state = HostState("spot")
     for number in range(ATTEMPTS):
         state = died(on(state, numbered(number), events.DrivesScanned("block", (f"sda-{number}",))))
@@ -109,7 +109,7 @@ def test_drive_that_carried_what_ran_is_counted_on_under_its_new_number() -> Non
 
 
 @pytest.mark.parametrize("is_found_late", [False, True])
-def test_payload_is_left_alone_after_the_machine_was_started_anew(is_found_late: bool) -> None:
+def test_payload_is_left_alone_after_the_machine_has_started_again(is_found_late: bool) -> None:
     state = HostState("spot")
     for _ in range(ATTEMPTS):
         state = died(

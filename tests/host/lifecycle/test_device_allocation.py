@@ -69,8 +69,8 @@ def test_nodes_of_a_device_come_together() -> None:
 
 
 def test_functions_of_a_composite_device_go_to_who_needs_each() -> None:
-    state, _ = after(host(needing("ear", mic=SOUND), needing("eye", camera=VIDEO)), comes(CAMERA))
-    assert has(state, "ear") == {"mic": ("usb:1-2", ["controlC1", "pcmC1D0c"])}
+    state, _ = after(host(needing("audio", mic=SOUND), needing("eye", camera=VIDEO)), comes(CAMERA))
+    assert has(state, "audio") == {"mic": ("usb:1-2", ["controlC1", "pcmC1D0c"])}
     assert has(state, "eye") == {"camera": ("usb:1-2", ["video0", "video1"])}
     assert not state.components["eye"].devices[0].contested_by
 
@@ -132,7 +132,7 @@ def test_device_that_moves_is_the_same_and_goes_to_who_had_it() -> None:
     assert len({one.identity for one in (LEFT, moved)}) == 1
 
 
-def test_what_nobody_needs_is_only_known() -> None:
+def test_device_that_no_component_needs_is_only_known() -> None:
     state, done = after(host(needing("eye", camera=VIDEO)), comes(LEFT))
     assert not done
     assert LEFT.id in state.devices

@@ -71,11 +71,11 @@ def test_payload_that_is_back_is_no_memory() -> None:
 
 def test_newer_version_supersedes_what_is_remembered() -> None:
     state, _ = after(*PULLED, DriveInserted("a", ROOT, "slot"), state=active("eye"))
-    newer = [found("k2", release=2), *way_to_active("k2", id="ear")[1:]]
+    newer = [found("k2", release=2), *way_to_active("k2", id="audio")[1:]]
     state, _ = after(*newer, state=state)
     assert not state.former, "nothing of the older version is offered beside the newer"
     state, _ = after(DriveRemoved("a"), state=state)
-    assert described(state) == {"org.x": ("1.0", ["ear"])}
+    assert described(state) == {"org.x": ("1.0", ["audio"])}
 
 
 def test_memory_outlives_restarts_of_the_daemon() -> None:
@@ -108,7 +108,7 @@ def test_those_that_left_first_are_forgotten_first() -> None:
     assert "org.x" in kept
 
 
-def test_payload_that_said_too_much_costs_the_others_nothing() -> None:
+def test_payload_that_said_too_much_displaces_no_other_one() -> None:
     known = {
         "org.long": left("org.long", 1.0, former_payloads.SIZE_LIMIT + 1),
         "org.short": left("org.short", 0.0),
@@ -119,7 +119,7 @@ def test_payload_that_said_too_much_costs_the_others_nothing() -> None:
 @given(
     st.lists(st.tuples(st.floats(0, 999), st.integers(0, former_payloads.SIZE_LIMIT)), max_size=20)
 )
-def test_all_that_is_remembered_has_room(payloads: list[tuple[float, int]]) -> None:
+def test_all_that_is_remembered_is_within_the_limits(payloads: list[tuple[float, int]]) -> None:
     known = {
         f"org.{n}": left(f"org.{n}", wall_s, size) for n, (wall_s, size) in enumerate(payloads)
     }

@@ -53,7 +53,7 @@ def test_payload_under_the_start_of_its_name_is_not_brought_back(
     assert found(tmp_path) == []
 
 
-def test_payload_whose_metadata_changed_is_not_brought_back(kept: Path, tmp_path: Path) -> None:
+def test_payload_with_changed_metadata_is_not_brought_back(kept: Path, tmp_path: Path) -> None:
     with (kept / "payload.toml").open("a") as manifest:
         manifest.write("# changed\n")
     assert found(tmp_path) == []

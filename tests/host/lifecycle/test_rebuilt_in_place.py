@@ -1,5 +1,5 @@
-"""A payload that is built anew on a drive that stays plugged in: its old release goes on until the
-new one is in force, and is then gone."""
+"""A payload that is built again on a drive that stays plugged in: its old release goes on until the
+new one is active, and is then gone."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ async def test_building_into_the_slot_upgrades(tmp_path: Path) -> None:
 
 
 @pytest.mark.anyio
-async def test_a_slot_whose_folder_goes_is_pulled(tmp_path: Path) -> None:
+async def test_a_slot_that_loses_its_folder_is_pulled(tmp_path: Path) -> None:
     lamp(tmp_path, tmp_path / "drive", 1)
     async with host_in_process(tmp_path, timing=Timing(startup_s=20.0, settle_beats=0)) as host:
         host.plug(tmp_path / "drive")

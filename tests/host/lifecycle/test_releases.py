@@ -1,4 +1,4 @@
-"""Which release of a payload is in force, whatever is plugged, pulled, broken or asked for."""
+"""Which release of a payload is active, whatever is plugged, pulled, broken or asked for."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TAKEN_IN = (Step.SUPERSEDED, Step.STORED, Step.PROBED, Step.ACTIVE)
 
 
 def upgraded(*, need: str = "") -> HostState:
-    """Release 2 (`k2`, drive `b`) is in force, release 1 (`k1`, drive `a`) waits."""
+    """Release 2 (`k2`, drive `b`) is active, release 1 (`k1`, drive `a`) waits."""
     newer = upgrade()
     entered = events.PayloadActivated("k2", (component("eye", "k2", need),))
     return after(drive("b"), *newer[:-1], entered, state=active(need=need))[0]
@@ -156,7 +156,7 @@ def test_release_that_breaks_later_gives_way_to_the_one_before() -> None:
 
 def test_release_that_cannot_run_beside_the_other_one_takes_its_place_first() -> None:
     before, _ = after(drive("b"), *upgrade()[:5], state=active())
-    state, done = after(events.BesideRefused("k2", "no room"), state=before)
+    state, done = after(events.BesideRefused("k2", "no memory"), state=before)
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.STORED}
     assert set(done) == {
         effects.RestPayload("k1", ("eye",)),
@@ -197,7 +197,7 @@ def saying(key: str, description: PluginDescription) -> list[Event]:
 
 @pytest.mark.parametrize(
     ("description", "code"),
-    [(says("knwon"), "E-UNDECL"), (says("known", phrase="knwon"), "PHRASE_INVALID")],
+    [(says("knwon"), "PDDL_UNKNOWN"), (says("known", phrase="knwon"), "PHRASE_INVALID")],
     ids=["fragment", "phrase"],
 )
 def test_release_that_cannot_be_planned_with_is_refused_where_the_old_one_could(
@@ -226,15 +226,15 @@ def test_first_release_is_taken_though_it_cannot_be_planned_with() -> None:
 def test_release_that_keeps_another_payload_out_of_planning_is_refused() -> None:
     """It says a word otherwise than the other one, and comes before it."""
     heard = "(define (domain more) (:predicates (heard {})))"
-    other = PluginDescription("ear", "1", fragments=(Fragment("m", heard.format("?h - host")),))
-    way = way_to_active("k9", "c", "ear", payload_id="org.y")
-    entered = replace(component("ear", "k9"), description=other)
+    other = PluginDescription("audio", "1", fragments=(Fragment("m", heard.format("?h - host")),))
+    way = way_to_active("k9", "c", "audio", payload_id="org.y")
+    entered = replace(component("audio", "k9"), description=other)
     way[-1] = events.PayloadActivated("k9", (entered,))
     before, _ = after(drive("a"), *saying("k1", says("known")), drive("c"), *way)
     more = Fragment("more.pddl", heard.format("?h - host ?of - host"))
     unlike = replace(says("known"), fragments=(*says("known").fragments, more))
     state, _ = after(drive("b"), *saying("k2", unlike)[:3], state=before)
-    assert codes(state, "k2") == ["E-PRED-ARITY"]
+    assert codes(state, "k2") == ["PDDL_ARITY"]
     assert steps(state)["k1"] is Step.ACTIVE
 
 
@@ -245,7 +245,7 @@ def test_release_that_came_first_gives_way_to_an_older_one_that_can_be_planned_w
     waiting, _ = after(*both)
     assert steps(waiting) == {"k1": Step.SUPERSEDED, "k2": Step.STORED}
     state, _ = after(*newer[5:], state=waiting)
-    assert codes(state, "k2") == ["E-UNDECL"]
+    assert codes(state, "k2") == ["PDDL_UNKNOWN"]
     assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
 
 
@@ -358,7 +358,7 @@ def test_retry_goes_forward_again() -> None:
     assert not state.rollbacks
 
 
-def test_newer_release_that_is_plugged_in_anew_counts_again() -> None:
+def test_newer_release_that_is_plugged_in_again_counts_again() -> None:
     pulled, _ = after(events.DriveRemoved("b"), events.PayloadCleared("k2"), state=gone_back())
     state, _ = after(drive("b"), *upgrade(), state=pulled)
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
@@ -531,17 +531,17 @@ class Releases(RuleBasedStateMachine):
     # What holds
 
     @invariant()
-    def one_at_most_is_in_force(self) -> None:
+    def one_at_most_is_active(self) -> None:
         if not hasattr(self, "state"):
             return
-        in_force = [p.key for p in self.state.payloads.values() if p.step is Step.ACTIVE]
+        active_keys = [p.key for p in self.state.payloads.values() if p.step is Step.ACTIVE]
         starting = [p for p in self.state.payloads.values() if p.step in releases.STARTING]
-        assert len(in_force) <= 1
+        assert len(active_keys) <= 1
         assert len(starting) <= 1
-        assert [c.payload for c in self.state.components.values()] == in_force
+        assert [c.payload for c in self.state.components.values()] == active_keys
 
     def teardown(self) -> None:
-        """In the end the highest that is here and works is in force, and nothing else is left."""
+        """In the end the highest that is here and works is active, and nothing else is left."""
         if not hasattr(self, "state"):
             return
         while self.todo:
@@ -551,7 +551,7 @@ class Releases(RuleBasedStateMachine):
         works = [p for p in present.values() if p.step in TAKEN_IN]
         assert all(p.step in (Step.ACTIVE, Step.SUPERSEDED) for p in works)
         if works:
-            best = max(works, key=self.standing)
+            best = max(works, key=self.precedence)
             assert best.step is Step.ACTIVE
         else:
             assert not self.state.components
@@ -564,8 +564,8 @@ class Releases(RuleBasedStateMachine):
         assert not self.state.rollbacks
         assert not self.state.drives
 
-    def standing(self, payload: PayloadRecord) -> tuple[int, bool]:
-        return releases.standing(self.state, payload)
+    def precedence(self, payload: PayloadRecord) -> tuple[int, bool]:
+        return releases.precedence(self.state, payload)
 
 
 # 25 in the full run, 250 in a campaign: an example is forty steps.

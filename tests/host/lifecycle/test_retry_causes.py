@@ -84,7 +84,7 @@ async def test_more_than_there_was_is_not_enough_where_the_need_is_known(
     assert (len(known.asked), len(unknown.asked)) == (0, 1)
 
 
-async def test_tries_in_vain_come_later_and_later(clock: VirtualClock) -> None:
+async def test_failed_attempts_come_later_and_later(clock: VirtualClock) -> None:
     host = Host(FULL)
     host.has = MUCH
     async with host.watched():

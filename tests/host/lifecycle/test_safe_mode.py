@@ -71,7 +71,7 @@ def test_drives_are_not_looked_at(kind: str) -> None:
     assert [problem.code for problem in state.drives["b"].problems] == ["SAFE_MODE"]
 
 
-def test_payload_of_a_drive_is_refused_whoever_found_it() -> None:
+def test_payload_of_a_drive_is_refused_in_any_case() -> None:
     state = recover(HostState("spot"), AT, safety=Safety.INITIAL).state
     state, _ = after(drive("b"), found("k2", "b"), state=state)
     assert state.payloads["k2"].step is Step.REFUSED
@@ -100,7 +100,7 @@ def test_one_payload_may_be_tried_by_order() -> None:
 
 
 def test_all_is_taken_in_again_once_it_is_left() -> None:
-    """And whom this host trusts is asked for anew."""
+    """And the host checks again whether the payloads are trusted."""
     state, _ = safely(active())
     state, done = after(events.SafeModeLeft("spot"), state=state)
     assert state.safety is Safety.OFF

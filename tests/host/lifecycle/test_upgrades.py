@@ -63,7 +63,7 @@ def lamp(root: Path, release: int) -> Path:
 
 
 def version(host: HostInProcess) -> str:
-    """The version of the lamp that is in force."""
+    """The version of the lamp that is active."""
     component = host.snapshot.component("lamp")
     return component.version if component is not None else ""
 
@@ -122,7 +122,7 @@ async def start(ctx):
 async def test_condition_that_ends_before_its_component_is_there_is_its_problem(
     tmp_path: Path,
 ) -> None:
-    """Of a first release, and of one that was brought up beside another, where nobody heard it."""
+    """Of a first release, and of one brought up beside another, which has no listener yet."""
     drives = [tmp_path / "drive-1", tmp_path / "drive-2"]
     for number, drive in enumerate(drives, 1):
         part = Part("lamp", DYING, version=f"{number}.0")

@@ -41,7 +41,7 @@ pytestmark = pytest.mark.anyio
 LAMP_ID = "org.example.lamp"
 
 
-def heard(host: HostInProcess, kind: type) -> list[object]:
+def events_of(host: HostInProcess, kind: type) -> list[object]:
     return [event for event in host.heard if type(event) is kind]
 
 
@@ -69,7 +69,7 @@ async def test_a_goal_that_lies_loose_is_told_with_its_drive(tmp_path: Path) -> 
     async with host_in_process(tmp_path) as host:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        await host.until(lambda: bool(heard(host, DriveRead)))
+        await host.until(lambda: bool(events_of(host, DriveRead)))
         (drive,) = host.snapshot.drives
         assert [problem.code for problem in drive.problems] == ["GOAL_UNSIGNED"]
 
@@ -83,7 +83,7 @@ async def test_payload_that_came_under_a_shorter_key_keeps_it(tmp_path: Path) ->
     short = key[: payload_key.FORMER_DIGITS]
     _rename(host.folders, key, short)
     async with host_in_process(tmp_path) as host:
-        await host.until(lambda: bool(heard(host, DriveRead)))
+        await host.until(lambda: bool(events_of(host, DriveRead)))
         assert (await host.until_step(LAMP_ID, Step.ACTIVE)).key == short
         host.pull()
         await host.until(lambda: not host.snapshot.payloads)
@@ -120,7 +120,7 @@ async def test_copies_of_a_payload_are_installed_once(tmp_path: Path) -> None:
         after = await host.until_step(LAMP_ID, Step.ACTIVE)
         assert after.key == record.key
         assert host.workers.pids() == pids
-        assert len(heard(host, WheelsStored)) == 1
+        assert len(events_of(host, WheelsStored)) == 1
         host.pull("other")
         await host.until_gone(LAMP_ID)
 
@@ -145,7 +145,7 @@ async def test_bad_cable_is_told_and_read_once_it_holds(
             await host.until_step(LAMP_ID, Step.ACTIVE)
             (told,) = (event for event in host.heard if isinstance(event, DriveFlapping))
             assert [problem.code for problem in told.problems] == ["DRIVE_FLAPPING"]
-            assert len(heard(host, DriveInserted)) <= debounce.FREE_FLAPS + 1
+            assert len(events_of(host, DriveInserted)) <= debounce.FREE_FLAPS + 1
 
 
 async def test_drive_that_could_not_be_unmounted_is_not_let_go_unasked(

@@ -125,13 +125,13 @@ def test_what_was_promised_while_it_was_copied_counts(tmp_path: Path) -> None:
         "reserve_mb": 0,
         "confinement": "none",
         "allow_unsigned": True,
-        "room": {"promised": asdict(promised), "freed_mb": 0, "freed_gpu_mb": 0},
+        "headroom": {"promised": asdict(promised), "freed_mb": 0, "freed_gpu_mb": 0},
     }
     with pytest.raises(PayloadRefused) as refused:
         install(arguments, lambda phase, done, total: None)
     assert [problem.code for problem in refused.value.problems] == ["NO_MEMORY"]
     assert not (tmp_path / "store").exists()
-    told = install({**arguments, "room": None}, lambda phase, done, total: None)
+    told = install({**arguments, "headroom": None}, lambda phase, done, total: None)
     assert told["needs"]["memory_mb"] == 1, "what was let in before is not asked again"
 
 
@@ -144,7 +144,7 @@ def is_at(host: HostInProcess, payload_id: str, step: Step) -> bool:
 def test_what_one_payload_uses_is_not_another_ones(
     promised: dict[str, int], used: dict[str, int]
 ) -> None:
-    """Whoever takes more than was promised to it takes nothing from what others were promised."""
+    """A payload that uses more than its reservation takes nothing from the other reservations."""
     made = {key: Needs(f"id-{key}", mb) for key, mb in promised.items()}
     whole = total(made, used)
     alone = [total({key: needs}, used).unused_mb for key, needs in made.items()]
@@ -156,7 +156,7 @@ def test_what_one_payload_uses_is_not_another_ones(
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="becomes another user")
 def test_of_another_users_process_it_is_known_what_is_in_memory() -> None:
-    """That is what daemons see of workers which are not of their own user."""
+    """That is what daemons see of workers of another user."""
     daemon = os.getpid()
     reads, writes = os.pipe()
     child = os.fork()

@@ -1,4 +1,4 @@
-"""Payloads of those whom the trust file names run, no others; and it changes as its roots say."""
+"""Only payloads with a key that the trust file names run; and it changes as its roots say."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ async def test_what_a_trusted_key_signed_runs(tmp_path: Path) -> None:
         assert host.catalogue.state.highwater[LAMP_ID].owner == "maker"
 
 
-async def test_what_nobody_trusted_signed_is_refused(tmp_path: Path) -> None:
+async def test_payload_without_a_trusted_signature_is_refused(tmp_path: Path) -> None:
     async with trusting(tmp_path) as host:
         host.plug(lamp(tmp_path / "drive"))
         assert await refusal(host) == ["SIG_MISSING"]
@@ -80,9 +80,9 @@ async def test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read(tmp_path: Pa
         assert [event.problems[0].code for event in files] == ["TOO_LARGE"]
 
 
-async def test_a_host_that_trusts_nobody_runs_nothing(tmp_path: Path) -> None:
+async def test_a_host_that_trusts_no_key_runs_nothing(tmp_path: Path) -> None:
     async with trusting(tmp_path, None) as host:
-        assert "trusts nobody" in host.executor.trust.warnings[0]
+        assert "trusts no key" in host.executor.trust.warnings[0]
         drive = with_trust(lamp(tmp_path / "drive", ALICE), signed(FIRST, ROOT))
         host.plug(drive)
         assert await refusal(host) == ["SIG_UNTRUSTED"]
@@ -214,7 +214,7 @@ async def test_false_trust_files_are_told_and_change_nothing(tmp_path: Path) -> 
         assert all(problem.fix for entry in entries for problem in entry.problems)
 
 
-async def test_a_payload_whose_key_is_revoked_ends(tmp_path: Path) -> None:
+async def test_a_payload_ends_when_its_key_is_revoked(tmp_path: Path) -> None:
     async with trusting(tmp_path) as host:
         host.plug(lamp(tmp_path / "drive", ALICE))
         await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -226,7 +226,7 @@ async def test_a_payload_whose_key_is_revoked_ends(tmp_path: Path) -> None:
         assert not host.workers.pids()
 
 
-async def test_a_payload_whose_key_is_revoked_may_go_on_and_says_so(tmp_path: Path) -> None:
+async def test_a_payload_with_a_revoked_key_may_go_on_and_says_so(tmp_path: Path) -> None:
     async with trusting(tmp_path, stop=False) as host:
         host.plug(lamp(tmp_path / "drive", ALICE))
         record = await host.until_step(LAMP_ID, Step.ACTIVE)
@@ -275,7 +275,7 @@ async def test_an_update_that_was_changed_on_disk_is_not_believed(tmp_path: Path
         assert any("TRUST_SIGNATURE" in warning for warning in host.executor.trust.warnings)
 
 
-async def test_a_first_file_that_others_can_write_is_not_believed(tmp_path: Path) -> None:
+async def test_a_first_file_that_other_users_can_write_is_not_believed(tmp_path: Path) -> None:
     enrol(tmp_path).chmod(0o666)
     async with trusting(tmp_path) as host:
         assert host.executor.trust.trust is None

@@ -111,7 +111,7 @@ async def refused(locking: asyncio.Task[StateLock], code: str) -> str:
     return str(found.value)
 
 
-async def test_daemon_that_runs_keeps_others_out(tmp_path: Path, clock: VirtualClock) -> None:
+async def test_daemon_that_runs_keeps_a_second_one_out(tmp_path: Path, clock: VirtualClock) -> None:
     with daemon(tmp_path) as running:
         locking = asyncio.create_task(state_lock.lock(tmp_path))
         await clock.advance(HEALTHY_S + LOOK_S)

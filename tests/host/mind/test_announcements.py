@@ -1,4 +1,4 @@
-"""What people are told is kept, in order, and within bounds whoever it is told of."""
+"""Announcements are kept, in order, and within bounds, whatever their subject."""
 
 from __future__ import annotations
 
@@ -52,11 +52,15 @@ def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anythi
 
 
 def test_what_was_told_of_a_component_that_is_kept_out_is_over_when_it_is_not_any_more() -> None:
-    people, wrong, worse = People(lambda: 5.0), Problem("E-UNDECL", "a"), Problem("E-UNDECL", "b")
-    kept_out(people, {}, {"eye": (wrong,), "ear": (wrong,)})
-    kept_out(people, {"eye": (wrong,), "ear": (wrong,)}, {"eye": (worse,), "ear": (wrong,)})
-    assert [told.about for told in people if not told.is_over] == ["kept out ear", "kept out eye"]
-    kept_out(people, {"eye": (worse,), "ear": (wrong,)}, {"eye": (worse,)})
+    people, wrong, worse = (
+        People(lambda: 5.0),
+        Problem("PDDL_UNKNOWN", "a"),
+        Problem("PDDL_UNKNOWN", "b"),
+    )
+    kept_out(people, {}, {"eye": (wrong,), "cam": (wrong,)})
+    kept_out(people, {"eye": (wrong,), "cam": (wrong,)}, {"eye": (worse,), "cam": (wrong,)})
+    assert [told.about for told in people if not told.is_over] == ["kept out cam", "kept out eye"]
+    kept_out(people, {"eye": (worse,), "cam": (wrong,)}, {"eye": (worse,)})
     assert [told.about for told in people if not told.is_over] == ["kept out eye"]
     kept_out(people, {"eye": (worse,)}, {})
     assert all(told.is_over for told in people)

@@ -53,10 +53,10 @@ async def test_pulled_camera_takes_all_down_in_one_tick(robot: Robot) -> None:
 
 async def test_behaviour_that_fails_is_told_with_what_needs_it(robot: Robot) -> None:
     await follow(robot)
-    robot.call("track").end(RunState.FAILED, "nobody is there")
+    robot.call("track").end(RunState.FAILED, "no person is there")
     await robot.until(lambda: bool(told(robot)))
     first = told(robot)[0]
-    assert dict(first.lost) == {next(iter(first.lost)): "nobody is there"}
+    assert dict(first.lost) == {next(iter(first.lost)): "no person is there"}
     assert schemas(first.lost) == {"visual-tracker.track"}
     assert schemas(first.halted) == {"mobile-base.drive"}
 

@@ -108,7 +108,7 @@ LIT = """(define (domain lamp) (:predicates (lit ?h - host))
     (:action shine :parameters (?u - light ?h - host) :precondition (ready ?u) :effect (lit ?h)))"""
 
 
-async def test_goal_whose_words_went_names_who_brought_them(robot: Robot) -> None:
+async def test_goal_that_lost_its_words_names_the_component_that_brought_them(robot: Robot) -> None:
     (report,) = SPEAKER.behaviours
     shine = replace(report, name="shine", action="(shine ?u - light ?h - host)", lasting=True)
     lamp = replace(
@@ -405,7 +405,7 @@ async def test_goal_about_removed_words_is_suspended(robot: Robot) -> None:
 
 
 async def test_unknown_goal_is_refused(robot: Robot) -> None:
-    with pytest.raises(GoalRefused, match="nobody declares"):
+    with pytest.raises(GoalRefused, match="is not declared"):
         robot.mind.give(pddl=POINT)
     with pytest.raises(GoalRefused, match="nothing here understands"):
         robot.mind.give(words="make tea")

@@ -164,7 +164,7 @@ async def test_no_planner_is_no_proof(task: GroundTask) -> None:
         ("babbler", "PLANNER_RAISED TypeError: a planner answers with"),
         ("glutton", "it ran out of memory"),
         ("stranger", "PLANNER_START planner stranger: it speaks no language of this host"),
-        ("nobody", "PLANNER_START planner nobody: it does not start"),
+        ("absent", "PLANNER_START planner absent: it does not start"),
     ],
 )
 async def test_misbehaving_planner_gave_up(
@@ -245,7 +245,7 @@ async def test_planner_works_where_no_folder_can_be_made(
     assert isinstance((await Planners([planner("native")]).plan(task, 5.0)).answer, Plan)
 
 
-async def test_planner_for_which_no_descriptor_is_left_leaves_the_search_to_others(
+async def test_planner_for_which_no_descriptor_is_left_leaves_the_search_to_another(
     planner: Make, task: GroundTask, tmp_path: Path
 ) -> None:
     others, late = planner("native"), planner("pyperplan")
@@ -390,9 +390,7 @@ async def test_cancelling_kills_the_search(planner: Make, task: GroundTask) -> N
         os.kill(pid, 0)
 
 
-async def test_child_whose_end_nobody_waited_for_is_waited_for_at_last(
-    planner: Make, task: GroundTask
-) -> None:
+async def test_unreaped_child_is_reaped_at_last(planner: Make, task: GroundTask) -> None:
     process = planner("hanger")
     await process.warm()
     pid = process.pid

@@ -1,4 +1,4 @@
-"""Goals that are done anew each time that they are asked for, and their answers."""
+"""Goals that are done again each time that they are given, and their answers."""
 
 from __future__ import annotations
 

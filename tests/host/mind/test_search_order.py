@@ -59,7 +59,7 @@ def test_nothing_is_due() -> None:
 
 
 @given(st.lists(st.integers(1, 9), unique=True, min_size=1), st.integers(0, 9))
-def test_nobody_waits_longer_than_one_round(numbers: list[int], begun: int) -> None:
+def test_no_goal_waits_longer_than_one_round(numbers: list[int], begun: int) -> None:
     turns, due = Turns(), goals(*numbers)
     nexts(turns, due, begun)
     assert set(nexts(turns, due, 2 * len(due))) == {goal.id for goal in due}

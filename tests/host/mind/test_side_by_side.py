@@ -82,7 +82,7 @@ async def test_plan_relies_on_what_another_goals_plan_keeps_so(robot: Robot) -> 
     ]
 
 
-async def test_plan_whose_support_another_goal_took_away_is_made_anew(robot: Robot) -> None:
+async def test_plan_that_lost_its_support_to_another_goal_is_made_again(robot: Robot) -> None:
     await follow(robot)
     robot.plug(SPEAKER)
     robot.stubborn.add("watch")
@@ -116,7 +116,7 @@ async def test_less_urgent_goal_waits_for_what_a_more_urgent_one_uses(robot: Rob
     assert robot.running == {"beacon.flash"}
 
 
-async def test_goal_whose_own_plan_is_stuck_once_another_made_way_is_suspended(
+async def test_goal_is_suspended_when_its_plan_is_stuck_after_another_goal_made_way(
     robot: Robot,
 ) -> None:
     robot.plug(RUDE)
@@ -127,7 +127,7 @@ async def test_goal_whose_own_plan_is_stuck_once_another_made_way_is_suspended(
     assert [problem.code for problem in robot.mind.queue["2"].problems] == ["PLAN_STUCK"]
 
 
-async def test_goal_that_cannot_be_had_at_all_says_so_though_others_go_first(
+async def test_goal_that_cannot_be_had_at_all_says_so_though_another_goes_first(
     robot: Robot,
 ) -> None:
     robot.plug(BEACON, COMPTON_CAMERA)
@@ -159,7 +159,7 @@ async def test_same_goal_given_twice_is_pursued_once(robot: Robot) -> None:
     await robot.until(lambda: not robot.running)
 
 
-async def test_halting_one_goal_leaves_the_others_alone(robot: Robot) -> None:
+async def test_halting_one_goal_leaves_the_rest_alone(robot: Robot) -> None:
     await follow(robot)
     robot.plug(LAMP)
     robot.mind.give(pddl=f"(lit {HOST}__lamp__led)", kind="maintain")
@@ -170,7 +170,7 @@ async def test_halting_one_goal_leaves_the_others_alone(robot: Robot) -> None:
     assert halted(robot) == {"lamp.shine"}
 
 
-async def test_failure_of_one_goals_behaviour_is_no_matter_of_the_others(robot: Robot) -> None:
+async def test_failure_of_one_goals_behaviour_does_not_affect_other_goals(robot: Robot) -> None:
     await follow(robot)
     robot.plug(LAMP)
     robot.broken.add("lamp")

@@ -13,7 +13,7 @@ from nondum.sdk.description import Label
 
 pytestmark = pytest.mark.anyio
 
-NOBODY_ELSE = (HOST,)
+ALONE = (HOST,)
 
 
 @pytest.fixture
@@ -28,19 +28,19 @@ def stoppable(robot: Robot) -> Robot:
 
 @pytest.mark.parametrize("said", [f"halt {HOST}", f"please halt, {HOST}", f"{HOST}, stop"])
 async def test_own_name_is_known_before_the_word_and_behind(stoppable: Robot, said: str) -> None:
-    host, rest = said_to(said, NOBODY_ELSE, stoppable.mind)
+    host, rest = said_to(said, ALONE, stoppable.mind)
     assert (host, rest) in ((HOST, "halt"), (HOST, "stop"))
 
 
 async def test_name_behind_is_known_where_nothing_is_plugged_in(robot: Robot) -> None:
-    assert said_to(f"stop {HOST}", NOBODY_ELSE, robot.mind) == (HOST, "stop")
+    assert said_to(f"stop {HOST}", ALONE, robot.mind) == (HOST, "stop")
     assert said_to("stop mule", (HOST, "mule"), robot.mind) == ("mule", "stop")
     assert is_stop_for_stranger("stop river", robot.mind)
 
 
 async def test_sentence_of_a_phrase_is_no_name_behind(stoppable: Robot) -> None:
     said = f"stop {HOST}"
-    assert said_to(said, NOBODY_ELSE, stoppable.mind) == (None, said)
+    assert said_to(said, ALONE, stoppable.mind) == (None, said)
     assert not is_stop_for_stranger(said, stoppable.mind)
     assert not is_stop_for_stranger("stop source", stoppable.mind)
 
@@ -51,7 +51,7 @@ async def test_what_a_phrase_has_no_name_for_is_no_host(stoppable: Robot) -> Non
     assert is_stop_for_stranger("river, stop", stoppable.mind)
 
 
-async def test_other_sentences_are_said_to_nobody(stoppable: Robot) -> None:
-    for said in ("stop the music", "halt at the door", f"look at {HOST}"):
-        assert said_to(said, NOBODY_ELSE, stoppable.mind) == (None, said)
+async def test_other_sentences_are_addressed_to_no_host(stoppable: Robot) -> None:
+    for said in ("stop the music", "halt at the gate", f"look at {HOST}"):
+        assert said_to(said, ALONE, stoppable.mind) == (None, said)
         assert not is_stop_for_stranger(said, stoppable.mind)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -33,7 +34,7 @@ class Emergency(Behaviour):
 def cautious_tree(parts: Parts) -> Behaviour:
     """The default one with a guard above the task."""
     guarded = Selector("guarded", memory=False, children=[Emergency("red button"), parts.task])
-    return default_tree(Parts(parts.monitor, parts.world_model, parts.goals, guarded, parts.people))
+    return default_tree(replace(parts, task=guarded))
 
 
 class Faulty(Behaviour):

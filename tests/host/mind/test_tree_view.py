@@ -101,7 +101,7 @@ async def test_plan_that_goes_on_is_not_thrown_over_for_a_cheaper_way(robot: Rob
     camera = step_rows(robot)[0]
     assert camera["component"] == "thermal-camera"
     assert camera["chosen"]["why"] == (
-        "it costs 60, not 1, but a plan that goes on is not thrown over for that"
+        "it costs 60, not 1, but a running plan is not preempted for that"
     )
     robot.mind.halt()
     robot.mind.give(pddl=FOLLOW, kind="maintain")

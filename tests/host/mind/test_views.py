@@ -157,7 +157,7 @@ async def test_facts_are_explained(robot: Robot) -> None:
     assert rows[f"senses {CRYSTAL} radiation-source"] == "the fragment of compton-camera says so"
     found = robot.mind.views.fact(f"(idle {HEAD})")
     assert (found["fact"], found["holds"]) == (f"idle {HEAD}", False)
-    assert [(w["component"], w["said"]) for w in found["for"]] == [("", "nobody uses it")]
+    assert [(w["component"], w["said"]) for w in found["for"]] == [("", "nothing uses it")]
     [against] = found["against"]
     assert (against["component"], against["behaviour"]) == ("pan-tilt-unit", "point")
     assert found["denied_by"] == ["pan-tilt-unit.point"]
@@ -199,11 +199,11 @@ async def test_observers_that_disagree_are_told_once(robot: Robot) -> None:
     await robot.until(lambda: robot.mind.beliefs.world.revision > 0)
     robot.know("left", "at", "cup", "hall")
     robot.know("right", "at", "cup", "attic")
-    await robot.until(lambda: any("E-FACT-CONFLICT" in text for text in robot.told))
+    await robot.until(lambda: any("PDDL_FACT_CONFLICT" in text for text in robot.told))
     robot.know("left", "at", "cup", "hall")
     await robot.until(lambda: robot.mind.beliefs.world.holds("at cup hall"))
-    assert sum("E-FACT-CONFLICT" in text for text in robot.told) == 1
-    assert any("E-FACT-CONFLICT" in problem for problem in robot.mind.views.why()["problems"])
+    assert sum("PDDL_FACT_CONFLICT" in text for text in robot.told) == 1
+    assert any("PDDL_FACT_CONFLICT" in problem for problem in robot.mind.views.why()["problems"])
     assert robot.mind.views.fact("at cup attic")["instead"] == "at cup hall"
 
 
@@ -239,7 +239,7 @@ async def test_behaviours_show_what_runs(robot: Robot) -> None:
     }
 
 
-async def test_behaviours_show_the_phrases_that_ask_for_them_whoever_brought_them(
+async def test_behaviours_show_the_phrases_of_any_component_that_ask_for_them(
     robot: Robot,
 ) -> None:
     phrase = Phrase("aim at {t:target}", "(pointing self ?t)", "maintain")
@@ -253,7 +253,7 @@ async def test_behaviours_of_what_is_kept_out_of_planning_say_so(robot: Robot) -
     broken = replace(PAN_TILT_UNIT, fragments=(Fragment("domain.pddl", "(define (domain"),))
     robot.plug(broken)
     [row] = robot.mind.views.behaviours()
-    assert "E-SYNTAX" in row["problem"]
+    assert "PDDL_SYNTAX" in row["problem"]
 
 
 async def test_plans_are_told_in_short_and_kept_whole(robot: Robot) -> None:
@@ -271,7 +271,7 @@ async def test_units_that_a_behaviour_uses_are_not_said_to_be_unused(robot: Robo
     robot.mind.give(pddl="(following self person)", kind="maintain")
     await robot.until_holding()
     said = {row["fact"]: row["source"] for row in robot.mind.views.facts()}
-    unused = {fact for fact, source in said.items() if source == "nobody uses it"}
+    unused = {fact for fact, source in said.items() if source == "nothing uses it"}
     assert f"idle {CRYSTAL}" in unused
     assert f"idle {HOST}__people-detector__hog" not in unused
     assert "people-detector.detect uses it" in said[f"idle {HOST}__people-detector__hog"]

@@ -28,9 +28,9 @@ class Network:
     def all(self) -> Iterable[Hinted]:
         return list(self.hints.values())
 
-    def tells(self, keeper: PeerTrustStore) -> Callable[[int | None], None]:
+    def tells(self, trust_store: PeerTrustStore) -> Callable[[int | None], None]:
         def announce(port: int | None) -> None:
             at = ("tcp://127.0.0.1:7410", "tcp://[::1]:7410")
-            self.hints[keeper.key] = Hinted(keeper.key, keeper.host.name, at, port)
+            self.hints[trust_store.key] = Hinted(trust_store.key, trust_store.host.name, at, port)
 
         return announce

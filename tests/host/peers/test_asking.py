@@ -22,7 +22,7 @@ ABLE = "I can follow you."
 
 
 class OnePeer:
-    """Reaches a peer with a desk of its own."""
+    """Reaches one peer, which serves these calls."""
 
     def __init__(self, serves: dict[str, Any]) -> None:
         self.requests = Dispatcher()
@@ -63,7 +63,7 @@ async def test_question_goes_to_the_peer_that_it_names(words: str, peer: str) ->
 
 
 @pytest.mark.parametrize("words", ["what can you do", "mule, follow me", "scout, what can you do"])
-async def test_other_words_are_asked_of_nobody(words: str) -> None:
+async def test_other_words_are_asked_of_no_peer(words: str) -> None:
     assert await asking(OnePeer({})).ask(words) is None
 
 

@@ -42,7 +42,7 @@ async def test_call_that_is_not_known_is_refused() -> None:
 @pytest.mark.parametrize(
     ("stream", "code"),
     [
-        ("mule__watcher__image", "STREAM_UNKNOWN"),  # it is offered, and nobody produces it
+        ("mule__watcher__image", "STREAM_UNKNOWN"),  # it is offered, and no component produces it
         ("mule__other__image", "NOT_OFFERED"),
         ("rover__watcher__image", "NOT_OFFERED"),
         (None, "NOT_OFFERED"),

@@ -13,7 +13,7 @@ from nondum.host.peers.forwarded_goals import (
     MOST_PROBLEMS,
     MOST_REPLACED,
     ForwardedGoals,
-    standing,
+    goal_status,
 )
 from nondum.sdk.errors import GoalRefused
 
@@ -29,11 +29,11 @@ def given() -> ForwardedGoals:
 
 
 def told(**more: Any) -> dict[str, Any]:
-    standing = {"goal": "7", "state": "active", "reason": "", "holds": True, "problems": []}
-    return {**standing, "replaces": [], **more}
+    goal_status = {"goal": "7", "state": "active", "reason": "", "holds": True, "problems": []}
+    return {**goal_status, "replaces": [], **more}
 
 
-async def test_row_says_whose_goal_it_is_and_how_it_stands() -> None:
+async def test_row_names_the_host_of_the_goal_and_its_state() -> None:
     away = given()
     away.hear("rover", told(problems=[{"code": "WHY_X", "message": "no", "fix": "do"}]))
     (row,) = away.rows()
@@ -44,7 +44,7 @@ async def test_row_says_whose_goal_it_is_and_how_it_stands() -> None:
         "blink",
     )
     assert (row["state"], row["holds"], row["problems"][0]["code"]) == ("active", True, "WHY_X")
-    assert standing(row) == told(problems=[{"where": "", **row["problems"][0]}])
+    assert goal_status(row) == told(problems=[{"where": "", **row["problems"][0]}])
 
 
 async def test_follower_is_told_of_each_change_and_of_the_loss_of_the_host() -> None:
@@ -90,7 +90,7 @@ async def test_peer_tells_which_goal_the_new_one_replaces() -> None:
     assert row["replaces"] == [older]
     away.hear("rover", told(replaces=[{**older, "is_over": True}]))
     assert away.rows()[0]["replaces"] == [{**older, "is_over": True}]
-    assert standing(away.rows()[0])["replaces"] == [{**older, "is_over": True}]
+    assert goal_status(away.rows()[0])["replaces"] == [{**older, "is_over": True}]
 
 
 async def test_what_a_peer_tells_is_bounded_and_plain() -> None:

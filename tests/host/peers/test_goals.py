@@ -17,7 +17,7 @@ from nondum.transport.peers.messages import Request
 pytestmark = pytest.mark.anyio
 
 
-class Nobody:
+class NoPeer:
     """No peer is reached."""
 
     def call(self, host: str, method: str, args: Body, *, deadline_s: float) -> Call:
@@ -56,7 +56,7 @@ def asked(words: object) -> IncomingCall:
 async def test_words_that_are_not_taken_become_no_goal(
     words: Any, accepts: bool, code: str
 ) -> None:
-    goals = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=accepts)
+    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=accepts)
     with pytest.raises(CallFailed, match=code):
         goals.serve_give(asked(words))
     with pytest.raises(CallFailed, match=code):
@@ -65,7 +65,7 @@ async def test_words_that_are_not_taken_become_no_goal(
 
 @pytest.mark.parametrize("priority", [1001, -1001, True, "1", 1.5])
 async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> None:
-    goals = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
+    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=True)
     incoming = asked("blink")
     incoming.args["priority"] = priority
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
@@ -78,7 +78,7 @@ async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> No
     ids=["nothing", "number", "list", "none", "too many"],
 )
 async def test_peer_that_is_back_asks_after_goals_by_id(goals: Any) -> None:
-    goals_here = Goals("mule", no_mind, Nobody(), lambda: (), no_stop, accepts=True)
+    goals_here = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=True)
     incoming = asked("blink")
     incoming.args["goals"] = goals
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):

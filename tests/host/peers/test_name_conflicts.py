@@ -12,28 +12,28 @@ KEY = HostKeys.generate().public
 
 
 class Look:
-    """Namesakes, on a clock and a network of their own."""
+    """Name conflicts, with an injected clock and network."""
 
     def __init__(self) -> None:
         self.now_s, self.hinted = 0.0, set[PeerKey]()
         self.called = "base"
-        self.namesakes = NameConflicts("rover", lambda: self.now_s, self.hints)
+        self.name_conflicts = NameConflicts("rover", lambda: self.now_s, self.hints)
 
     def hints(self) -> list[Hint]:
         at = ("tcp://10.77.0.9:7410",)
         return [Hint(key, self.called, 1, at, Source.MULTICAST) for key in self.hinted]
 
     def codes(self) -> list[str]:
-        return [problem.code for problem in self.namesakes.problems]
+        return [problem.code for problem in self.name_conflicts.problems]
 
 
 def turned_away(problem: Problem = TAKEN) -> Refusal:
     return Refusal(Reason.DUPLICATE, "10.77.0.9:40000", KEY, str(problem), 0.0, problem)
 
 
-def test_host_that_is_turned_away_for_its_name_is_told_while_it_tries() -> None:
+def test_host_that_is_turned_away_for_its_name_is_told_while_it_dials() -> None:
     look = Look()
-    look.namesakes.on_fleet(turned_away())
+    look.name_conflicts.on_fleet(turned_away())
     look.now_s = RECENT_S
     assert look.codes() == ["PEER_NAME_TAKEN"]
     look.now_s += 1
@@ -43,7 +43,7 @@ def test_host_that_is_turned_away_for_its_name_is_told_while_it_tries() -> None:
 def test_host_that_turns_this_one_away_for_its_name_is_told_while_it_is_announced() -> None:
     look = Look()
     look.hinted.add(KEY)
-    look.namesakes.on_fleet(DialFailed(KEY, "tcp://10.77.0.9:7410", TAKEN))
+    look.name_conflicts.on_fleet(DialFailed(KEY, "tcp://10.77.0.9:7410", TAKEN))
     look.now_s = 2 * RECENT_S  # what fails again in the same way is not told again
     assert look.codes() == ["PEER_NAME_TAKEN"]
     look.hinted.clear()
@@ -52,14 +52,16 @@ def test_host_that_turns_this_one_away_for_its_name_is_told_while_it_is_announce
 
 def test_host_that_has_another_name_now_is_told_no_more() -> None:
     look = Look()
-    look.namesakes.on_fleet(turned_away())
-    look.namesakes.on_fleet(PeerUp(KEY, "mule", 1, "tcp://10.77.0.9:7410", "pairing"))
+    look.name_conflicts.on_fleet(turned_away())
+    look.name_conflicts.on_fleet(PeerUp(KEY, "mule", 1, "tcp://10.77.0.9:7410", "pairing"))
     assert look.codes() == []
 
 
 def test_other_refusals_are_no_matter_of_names() -> None:
     look = Look()
-    look.namesakes.on_fleet(turned_away(Problem("PEER_DUPLICATE", "an old connection came late")))
+    look.name_conflicts.on_fleet(
+        turned_away(Problem("PEER_DUPLICATE", "an old connection came late"))
+    )
     assert look.codes() == []
 
 
@@ -77,5 +79,5 @@ def test_host_that_was_not_let_in_is_not_told_twice() -> None:
     look = Look()
     look.called = "rover"
     look.hinted.add(KEY)
-    look.namesakes.on_fleet(turned_away())
+    look.name_conflicts.on_fleet(turned_away())
     assert look.codes() == ["PEER_NAME_TAKEN"]

@@ -28,9 +28,9 @@ Row = dict[str, Any]
 
 @dataclass
 class Host:
-    """A host with a desk, and what the person at it sees."""
+    """A host that can be paired, and what the person at it sees."""
 
-    keeper: PeerTrustStore
+    trust_store: PeerTrustStore
     requests: PairingRequests
     rows: list[Row] = field(default_factory=list)
     news: asyncio.Event = field(default_factory=asyncio.Event)
@@ -63,9 +63,11 @@ class Host:
 
 @contextlib.asynccontextmanager
 async def host(folder: Path, network: Network, name: str) -> AsyncIterator[Host]:
-    keeper = await PeerTrustStore.open(folder / name / "peers", name)
-    requests = PairingRequests(keeper, announce=network.tells(keeper), candidates=network.all)
-    found = Host(keeper, requests)
+    trust_store = await PeerTrustStore.open(folder / name / "peers", name)
+    requests = PairingRequests(
+        trust_store, announce=network.tells(trust_store), candidates=network.all
+    )
+    found = Host(trust_store, requests)
     try:
         yield found
     finally:
@@ -86,20 +88,20 @@ async def test_people_who_say_yes_make_hosts_trust_each_other(pair: tuple[Host, 
     base.begins()
     here, there = await rover.sees("comparing"), await base.sees("comparing")
     assert here["code"] == there["code"]
-    assert (here["name"], here["fingerprint"]) == ("base", fingerprint(base.keeper.key))
-    assert (there["name"], there["fingerprint"]) == ("rover", fingerprint(rover.keeper.key))
+    assert (here["name"], here["fingerprint"]) == ("base", fingerprint(base.trust_store.key))
+    assert (there["name"], there["fingerprint"]) == ("rover", fingerprint(rover.trust_store.key))
     rover.requests.confirm(here["code"])
     await rover.sees("confirmed")
-    assert rover.keeper.trust.paired == {}
+    assert rover.trust_store.trust.paired == {}
     base.requests.confirm(there["code"])
     assert (await rover.sees("agreed"))["name"] == "base"
     await base.sees("agreed")
     for one, other in ((rover, base), (base, rover)):
-        again = await PeerTrustStore.open(one.keeper.folder, one.keeper.host.name)
-        assert again.trust.paired == {other.keeper.key: other.keeper.host.name}
+        again = await PeerTrustStore.open(one.trust_store.folder, one.trust_store.host.name)
+        assert again.trust.paired == {other.trust_store.key: other.trust_store.host.name}
 
 
-async def test_code_is_told_once_whoever_is_heard_of_meanwhile(
+async def test_code_is_told_once_whatever_host_is_found_meanwhile(
     tmp_path: Path, clock: VirtualClock
 ) -> None:
     """The host that is asked may hear of the other one only when both show the code."""
@@ -116,12 +118,12 @@ async def test_code_is_told_once_whoever_is_heard_of_meanwhile(
             assert [row["step"] for row in one.rows].count("comparing") == 1
 
 
-async def test_try_goes_on_when_the_other_host_is_heard_of_at_one_more_address(
+async def test_pairing_goes_on_when_the_other_host_is_found_at_one_more_address(
     tmp_path: Path, clock: VirtualClock
 ) -> None:
     network, at = Network(), ("tcp://127.0.0.1:7410",)
     async with host(tmp_path, network, "rover") as rover:
-        with hand_played(after=rover.keeper.key) as base:
+        with hand_played(after=rover.trust_store.key) as base:
             network.hints[base.keys.public] = Hinted(base.keys.public, "base", at, base.port)
             rover.begins()
             assert isinstance(await base.hears(), Ask)
@@ -178,9 +180,9 @@ async def test_window_is_announced_while_it_is_open(tmp_path: Path) -> None:
     async with host(tmp_path, network, "rover") as rover:
         rover.begins()
         await rover.sees("waiting")
-        assert network.hints[rover.keeper.key].pairing_port
+        assert network.hints[rover.trust_store.key].pairing_port
         await rover.leaves()
-        assert network.hints[rover.keeper.key].pairing_port is None
+        assert network.hints[rover.trust_store.key].pairing_port is None
         assert rover.requests.row() is None
 
 
@@ -193,7 +195,7 @@ async def test_no_of_one_person_is_told_to_both(pair: tuple[Host, Host]) -> None
     base.requests.refuse()
     for one in pair:
         assert (await one.sees("failed"))["problem"]["code"] == "PAIRING_REFUSED"
-        assert one.keeper.trust.paired == {}
+        assert one.trust_store.trust.paired == {}
 
 
 async def test_person_who_leaves_closes_the_window(pair: tuple[Host, Host]) -> None:
@@ -217,23 +219,23 @@ async def test_one_of_several_hosts_is_named_by_the_person(tmp_path: Path) -> No
     names = ("rover", "base", "other")
     async with contextlib.AsyncExitStack() as stack:
         hosts = [await stack.enter_async_context(host(tmp_path, network, name)) for name in names]
-        first, second, third = sorted(hosts, key=lambda one: one.keeper.key)
+        first, second, third = sorted(hosts, key=lambda one: one.trust_store.key)
         second.begins()
         third.begins()
         first.begins()
         seen = await first.sees("waiting", lambda row: len(row["candidates"]) == 2)
         assert {row["name"] for row in seen["candidates"]} == {
-            second.keeper.host.name,
-            third.keeper.host.name,
+            second.trust_store.host.name,
+            third.trust_store.host.name,
         }
         await first.leaves()
-        first.begins(fingerprint(third.keeper.key).lower())
+        first.begins(fingerprint(third.trust_store.key).lower())
         wanted = await first.sees("comparing")
-        assert wanted["name"] == third.keeper.host.name
+        assert wanted["name"] == third.trust_store.host.name
 
 
 async def test_host_that_is_not_the_named_one_is_not_compared(pair: tuple[Host, Host]) -> None:
-    asking, asked = sorted(pair, key=lambda one: one.keeper.key)
+    asking, asked = sorted(pair, key=lambda one: one.trust_store.key)
     asked.begins("somebody-else")
     asking.begins()
     told = await asking.sees("waiting", lambda row: row["problem"] is not None)
@@ -246,21 +248,21 @@ async def test_host_with_the_name_of_a_paired_one_is_refused_until_that_is_forgo
 ) -> None:
     rover, base = pair
     before = HostKeys.generate().public
-    await rover.keeper.pair(before, "base")
+    await rover.trust_store.pair(before, "base")
     rover.begins()
     base.begins()
     for one in pair:
         assert (await one.sees("failed"))["problem"]["code"] == "PAIRING_NAME"
         await one.leaves()
-    await rover.keeper.forget(before)
+    await rover.trust_store.forget(before)
     rover.begins()
     base.begins()
     await rover.sees("comparing")
 
 
 async def test_revoked_host_is_no_candidate(pair: tuple[Host, Host]) -> None:
-    asking, asked = sorted(pair, key=lambda one: one.keeper.key)
-    await asked.keeper.revoke(asking.keeper.key, "stolen")
+    asking, asked = sorted(pair, key=lambda one: one.trust_store.key)
+    await asked.trust_store.revoke(asking.trust_store.key, "stolen")
     asked.begins()
     asking.begins()
     await asking.sees("waiting", lambda row: row["problem"] is not None)
@@ -286,7 +288,7 @@ async def test_nothing_is_said_where_no_window_is_open(pair: tuple[Host, Host]) 
 
 async def test_host_that_cannot_be_kept_is_not_paired(pair: tuple[Host, Host]) -> None:
     rover, base = pair
-    (rover.keeper.folder / TRUST_NAME).mkdir()
+    (rover.trust_store.folder / TRUST_NAME).mkdir()
     rover.begins()
     base.begins()
     code = (await rover.sees("comparing"))["code"]
@@ -294,10 +296,10 @@ async def test_host_that_cannot_be_kept_is_not_paired(pair: tuple[Host, Host]) -
     base.requests.confirm(code)
     rover.requests.confirm(code)
     assert (await rover.sees("failed"))["problem"]["code"] == "PEERS_FOLDER"
-    assert rover.keeper.trust.paired == {}
+    assert rover.trust_store.trust.paired == {}
 
 
-async def test_hints_without_sense_hurt_nobody(tmp_path: Path) -> None:
+async def test_hints_without_sense_harm_nothing(tmp_path: Path) -> None:
     """Whatever the network says: a host in development, an address that is none, this host."""
     network = Network()
     async with host(tmp_path, network, "rover") as rover, host(tmp_path, network, "base") as base:
@@ -311,9 +313,9 @@ async def test_hints_without_sense_hurt_nobody(tmp_path: Path) -> None:
 
 
 async def test_development_is_refused(tmp_path: Path) -> None:
-    keeper = await PeerTrustStore.open(tmp_path, "rover")
+    trust_store = await PeerTrustStore.open(tmp_path, "rover")
     requests = PairingRequests(
-        keeper, announce=lambda _: None, candidates=lambda: (), is_development=True
+        trust_store, announce=lambda _: None, candidates=lambda: (), is_development=True
     )
     with pytest.raises(PeerRefused, match="PAIRING_DEVELOPMENT"):
         await anext(requests.pair())

@@ -146,7 +146,7 @@ async def test_value_that_is_no_message_is_refused() -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"component": "nobody"},
+        {"component": "missing"},
         {"behaviour": "fly"},
         {"arguments": {"u": "mule__other__head", "h": "rover"}},
     ],

@@ -13,7 +13,7 @@ from tests.host.peers.watcher import HEAD, component, merged_watcher, no_claims,
 from nondum.host.core.events import FactForgotten, FactKnown, StreamFlowing
 from nondum.host.core.records import DeviceClaim
 from nondum.host.peers import peer_entries
-from nondum.host.peers.offered_entries import Policy, changes, passing, standing
+from nondum.host.peers.offered_entries import Policy, catalogue_entries, changes, passing
 from nondum.host.peers.peer_entries import (
     BELOW_OWN,
     Introduced,
@@ -31,7 +31,7 @@ ME = Introduced("key", "mule", "tcp://10.0.0.2:7410", "pairing", "1f")
 
 def test_what_is_offered_is_understood() -> None:
     entries = {
-        **standing(snapshot(component()), Policy(frozenset({"watcher"}))),
+        **catalogue_entries(snapshot(component()), Policy(frozenset({"watcher"}))),
         "compute": {"processors": 4},
     }
     record = record_of(ME, entries)
@@ -49,7 +49,9 @@ def test_what_is_offered_is_understood() -> None:
 def test_component_with_a_name_of_its_host_is_one_like_any_other() -> None:
     name = "watcher--org-example-south"
     told = {
-        f"component/{name}": standing(snapshot(component()), Policy())["component/watcher"],
+        f"component/{name}": catalogue_entries(snapshot(component()), Policy())[
+            "component/watcher"
+        ],
         f"device/{name}": {"component": name},
     }
     record = record_of(ME, told)
@@ -58,16 +60,16 @@ def test_component_with_a_name_of_its_host_is_one_like_any_other() -> None:
 
 
 def test_actuators_are_withheld_and_with_them_what_only_they_do() -> None:
-    (offered,) = record_of(ME, standing(snapshot(component()), Policy())).components
+    (offered,) = record_of(ME, catalogue_entries(snapshot(component()), Policy())).components
     assert [unit.name for unit in offered.description.units] == ["eye"]
     assert (offered.abilities, offered.withheld) == (("look",), ("head",))
-    record = record_of(ME, standing(snapshot(component()), Policy()))
+    record = record_of(ME, catalogue_entries(snapshot(component()), Policy()))
     assert [mount.unit for mount in record.mounts] == ["mule__watcher__eye"]
 
 
 def test_component_of_withheld_units_only_brings_words() -> None:
     alone = component("watcher", HEAD)
-    (offered,) = record_of(ME, standing(snapshot(alone), Policy())).components
+    (offered,) = record_of(ME, catalogue_entries(snapshot(alone), Policy())).components
     assert (offered.abilities, offered.withheld) == ((), ("head",))
     assert offered.description == replace(alone.description, units=())
 
@@ -75,13 +77,15 @@ def test_component_of_withheld_units_only_brings_words() -> None:
 def test_type_of_actuator_that_a_plugin_declares_is_withheld_too() -> None:
     crane = component("watcher", Unit("boom", "crane"))
     policy = Policy(actuators=frozenset({"arm", "crane"}))
-    (offered,) = record_of(ME, standing(snapshot(crane), policy)).components
+    (offered,) = record_of(ME, catalogue_entries(snapshot(crane), policy)).components
     assert offered.withheld == ("boom",)
 
 
 def test_devices_that_serve_a_component_are_told() -> None:
     served = component(devices=(DeviceClaim("port", {}, optional=False, device="usb1"),))
-    assert record_of(ME, standing(snapshot(served), Policy())).devices == {"usb1": "watcher@mule"}
+    assert record_of(ME, catalogue_entries(snapshot(served), Policy())).devices == {
+        "usb1": "watcher@mule"
+    }
 
 
 def test_what_a_component_says_is_told_with_full_names_and_taken_back() -> None:
@@ -99,7 +103,7 @@ def test_what_a_component_says_is_told_with_full_names_and_taken_back() -> None:
     assert withdrawal(flows) == StreamFlowing("watcher@mule", "mule__watcher__image", flowing=False)
 
 
-def test_units_in_use_are_told_to_all_but_to_whom_they_serve() -> None:
+def test_units_in_use_are_told_to_all_peers_but_the_one_that_they_serve() -> None:
     taken = {"idle mule__watcher__head": "rover", "free mule__watcher__image": "mule"}
     entries = passing(snapshot(component()), Policy(), no_claims, taken)
     assert taken_in("mule", entries, "scout") == taken
@@ -143,7 +147,7 @@ def test_peer_speaks_of_its_own_streams_only() -> None:
 def test_entry_that_is_wrong_costs_itself_and_is_told(
     key: str, body: dict[str, Any], told: str
 ) -> None:
-    sound = standing(snapshot(component()), Policy())
+    sound = catalogue_entries(snapshot(component()), Policy())
     record = record_of(ME, {**sound, key: body})
     assert [offered.id for offered in record.components] == ["watcher@mule"]
     (problem,) = record.problems
@@ -153,7 +157,7 @@ def test_entry_that_is_wrong_costs_itself_and_is_told(
 
 def test_only_so_many_components_are_taken_over(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(peer_entries, "MOST_COMPONENTS", 1)
-    (key, body), *_ = standing(snapshot(component()), Policy()).items()
+    (key, body), *_ = catalogue_entries(snapshot(component()), Policy()).items()
     assert key == "component/watcher"
     record = record_of(ME, {key: body, "component/watcher-2": body})
     assert len(record.components) == 1

@@ -28,7 +28,7 @@ LAMP = PayloadRecord(
 )
 WRONG = (
     Problem("PYTHON_VERSION", "needs another Python", fix="use another payload"),
-    Problem("DISK_FULL", "no room", fix="free some"),
+    Problem("DISK_FULL", "the disk is full", fix="free some"),
 )
 
 
@@ -38,11 +38,11 @@ WRONG = (
         (
             events.PayloadRefused(KEY, WRONG),
             "org.example.lamp is refused: PYTHON_VERSION needs another Python → use another payload"
-            "; DISK_FULL no room → free some",
+            "; DISK_FULL the disk is full → free some",
         ),
         (
             events.PayloadFailed(KEY, WRONG[1:]),
-            "org.example.lamp does not work: DISK_FULL no room → free some",
+            "org.example.lamp does not work: DISK_FULL the disk is full → free some",
         ),
         (
             events.PayloadWithdrawn(KEY, "its drive was pulled"),
@@ -51,7 +51,7 @@ WRONG = (
         (events.PayloadWithdrawn("1", "it left"), "payload 1 is withdrawn: it left"),
         (
             events.DriveUnreadable("a", WRONG[1:]),
-            "drive a cannot be used: DISK_FULL no room → free some",
+            "drive a cannot be used: DISK_FULL the disk is full → free some",
         ),
         (events.DriveRead("a", ()), "drive a carries no payload"),
         (events.DriveRead("a", (KEY,)), None),
@@ -131,10 +131,10 @@ def test_takeover_and_return_are_told() -> None:
     lower = replace(new, version="0.9")
     snapshot = replace(snapshot, payloads=(snapshot.payloads[0], lower))
     told = announced(events.PayloadActivated(new.key, ()), snapshot)
-    assert told is not None and told.endswith("though its version is lower: 1 was in force")
+    assert told is not None and told.endswith("though its version is lower: 1 was active")
     back = Snapshot("spot", revision=3, payloads=(replace(OLD, step=Step.STORED),))
-    told = announced(events.PayloadResumed(KEY, "the one that was in force is not any more"), back)
-    assert told == ("org.example.lamp 1 comes back: the one that was in force is not any more")
+    told = announced(events.PayloadResumed(KEY, "the release that was active has stopped"), back)
+    assert told == ("org.example.lamp 1 comes back: the release that was active has stopped")
 
 
 def test_people_are_told_what_a_component_may_use() -> None:

@@ -86,7 +86,7 @@ async def test_robot_says_what_it_does(robot: Robot) -> None:
         views = robot.mind.views
         return activity(views.given(), views.plan()["steps"])
 
-    assert said() == "I do nothing: nobody has asked for anything."
+    assert said() == "I do nothing: no one has asked for anything."
     robot.plug(SENSING, POINTING)
     robot.mind.give(words=POINT)
     assert said() == f"I was asked to {POINT}, and look for a way."

@@ -60,7 +60,7 @@ def test_phrase_without_a_name_for_a_slot_cannot_be_said() -> None:
     assert told["names"] == {"class": ["dog"]}
 
 
-def test_names_that_no_packet_has_room_for_are_left_out() -> None:
+def test_names_that_do_not_fit_into_a_packet_are_left_out() -> None:
     classes = tuple(f"thing-number-{n}-of-very-many" for n in range(2000))
     told = sayings(book("find {c:class}", classes=classes))
     assert told["phrases"] == [*STOPPING, *ASKED, "find {class}"]

@@ -156,7 +156,7 @@ def test_journal_that_is_not_read_is_not_waited_for(
 def test_what_no_journal_takes_is_written_as_text(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    handler = JournalHandler(str(tmp_path / "nobody"))
+    handler = JournalHandler(str(tmp_path / "no-socket"))
     logger = logging.Logger("nondum.test")
     logger.addHandler(handler)
     logger.warning("hear me")

@@ -79,7 +79,7 @@ def test_watchdog_counts_only_for_the_process_that_it_names(manager: socket.sock
         notifier.close()
 
 
-def test_nobody_is_told_where_nobody_asks() -> None:
+def test_nothing_is_sent_where_no_service_manager_asks() -> None:
     notifier = Notifier.from_environment({"WATCHDOG_USEC": "1000000"})
     assert (notifier.is_asked, notifier.watchdog_s) == (False, None)
     notifier.ready()
@@ -87,7 +87,7 @@ def test_nobody_is_told_where_nobody_asks() -> None:
 
 
 def test_manager_that_is_gone_is_told_no_more(tmp_path: Path) -> None:
-    notifier = asked(str(tmp_path / "nobody"))
+    notifier = asked(str(tmp_path / "no-socket"))
     notifier.ready()
     assert not notifier.is_asked
     notifier.alive()

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.kit.command_line import quiet_environment
+from tests.kit.command_line import clean_environment
 from tests.kit.running_host import DAEMON, RunningHost, running, until_ended
 from tests.kit.until import until
 
@@ -37,7 +37,7 @@ def manager(tmp_path: Path) -> Iterator[socket.socket]:
         yield sock
 
 
-def heard(manager: socket.socket, *wanted: str) -> list[str]:
+def received(manager: socket.socket, *wanted: str) -> list[str]:
     """All that is said until the wanted assignments have been, in their order."""
     said: list[str] = []
     for one in wanted:
@@ -59,7 +59,7 @@ def served(
         [*DAEMON, "--config", str(host.config)],
         stderr=subprocess.PIPE,
         text=True,
-        env=quiet_environment() | asked,
+        env=clean_environment() | asked,
     )
     with process:
         try:
@@ -74,12 +74,12 @@ def test_daemon_is_ready_once_it_answers_and_says_what_it_does(
 ) -> None:
     host = RunningHost(tmp_path)
     with served(host, manager) as daemon:
-        said = heard(manager, "EXTEND_TIMEOUT_USEC=", "READY=1")
+        said = received(manager, "EXTEND_TIMEOUT_USEC=", "READY=1")
         assert host.run("status").ok().out.startswith("host ")
         assert "STATUS=starting" in said
-        heard(manager, "STATUS=0 components at work")
+        received(manager, "STATUS=0 components at work")
         daemon.terminate()
-        heard(manager, "STOPPING=1")
+        received(manager, "STOPPING=1")
 
 
 def test_daemon_that_is_started_while_the_one_before_it_ends_comes_up_after_it(
@@ -93,11 +93,11 @@ def test_daemon_that_is_started_while_the_one_before_it_ends_comes_up_after_it(
             until("it shows that it is ending", lambda: holder(host).is_ending)
             os.kill(before, signal.SIGSTOP)
         with served(host, manager):
-            heard(manager, f"STATUS=waiting for process {before} ")
+            received(manager, f"STATUS=waiting for process {before} ")
             os.kill(before, signal.SIGCONT)
             until_ended(before)
             assert host.stop() == 0
-            heard(manager, "READY=1")
+            received(manager, "READY=1")
 
 
 def holder(host: RunningHost) -> Holder:
@@ -118,14 +118,14 @@ def test_daemon_gives_signs_of_life_whenever_it_runs(
     tmp_path: Path, manager: socket.socket
 ) -> None:
     with served(RunningHost(tmp_path), manager, watchdog_s=0.4) as daemon:
-        heard(manager, "READY=1", "WATCHDOG=1")
-        heard(manager, "WATCHDOG=1")
+        received(manager, "READY=1", "WATCHDOG=1")
+        received(manager, "WATCHDOG=1")
         daemon.send_signal(signal.SIGSTOP)
         os.waitid(os.P_PID, daemon.pid, os.WSTOPPED)
         said(manager)
         daemon.send_signal(signal.SIGCONT)
         manager.settimeout(PATIENCE_S)
-        heard(manager, "WATCHDOG=1")
+        received(manager, "WATCHDOG=1")
 
 
 def said(manager: socket.socket) -> list[str]:

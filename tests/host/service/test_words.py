@@ -39,9 +39,9 @@ def test_goals_are_told_by_what_becomes_of_them() -> None:
     assert told(goals=goals) == ("0 components at work; does: follow me; cannot yet: point at it")
 
 
-def test_first_problem_is_told_and_the_others_are_counted() -> None:
-    full = Problem("DISK_FULL", "there is no room", fix="make some")
-    assert "needs help: DISK_FULL there is no room → make some" in told(drive(full))
+def test_first_problem_is_told_and_the_rest_is_counted() -> None:
+    full = Problem("DISK_FULL", "the disk is full", fix="free some")
+    assert "needs help: DISK_FULL the disk is full → free some" in told(drive(full))
     assert told(drive(full), drive(full, id="sdb1")).endswith("(and 1 more)")
 
 

@@ -38,13 +38,13 @@ async def test_lost_messages_are_told_and_later_ones_come(
 ) -> None:
     start = pyudev.Monitor.start
 
-    def start_with_little_room(monitor: pyudev.Monitor) -> None:
+    def start_with_a_small_buffer(monitor: pyudev.Monitor) -> None:
         start(monitor)
         monitor.set_receive_buffer_size(4096)
 
-    monkeypatch.setattr(pyudev.Monitor, "start", start_with_little_room)
+    monkeypatch.setattr(pyudev.Monitor, "start", start_with_a_small_buffer)
     with uevents(pyudev.Context(), "mem") as messages:
-        for _ in range(300):  # nobody reads meanwhile
+        for _ in range(300):  # nothing is read meanwhile
             have_told()
         assert await asyncio.wait_for(messages.next(), 60) is None
         async with asyncio.timeout(60):

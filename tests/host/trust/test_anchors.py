@@ -88,7 +88,7 @@ def test_file_that_is_not_there_is_told(etc: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [0o664, 0o646])
-def test_file_that_others_can_write_to_is_not_believed(anchor: Path, mode: int) -> None:
+def test_file_that_other_users_can_write_to_is_not_believed(anchor: Path, mode: int) -> None:
     anchor.chmod(mode)
     assert refusal(anchor) == ["TRUST_OPEN_TO_OTHERS"]
 
@@ -146,20 +146,22 @@ def test_links_that_are_there_are_replaced_not_followed(etc: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize("mode", [0o775, 0o757, 0o1777])
-def test_nothing_is_written_to_a_folder_that_others_can_change(etc: Path, mode: int) -> None:
+def test_nothing_is_written_to_a_folder_that_other_users_can_change(etc: Path, mode: int) -> None:
     etc.chmod(mode)
     assert place(etc / "trust.toml") == "TRUST_OPEN_TO_OTHERS"
     assert not list(etc.iterdir())
 
 
 @pytest.mark.parametrize("mode", [0o775, 0o757])
-def test_nothing_is_written_below_a_folder_that_others_can_change(etc: Path, mode: int) -> None:
+def test_nothing_is_written_below_a_folder_that_other_users_can_change(
+    etc: Path, mode: int
+) -> None:
     etc.chmod(mode)
     assert place(etc / "inner/trust.toml") == "TRUST_OPEN_TO_OTHERS"
     assert not list(etc.iterdir())
 
 
-def test_sticky_folder_may_lead_to_one_that_others_cannot_change(etc: Path) -> None:
+def test_sticky_folder_may_lead_to_one_that_other_users_cannot_change(etc: Path) -> None:
     etc.chmod(0o1777)
     assert place(etc / "inner/trust.toml") == ""
 
@@ -181,7 +183,7 @@ def test_links_on_the_way_are_followed(etc: Path, tmp_path: Path) -> None:
     assert anchors.load(etc / "trust.toml").origin is Origin.SIGNED
 
 
-def test_links_that_others_can_change_are_not_followed(etc: Path, tmp_path: Path) -> None:
+def test_links_that_other_users_can_change_are_not_followed(etc: Path, tmp_path: Path) -> None:
     """Another user would choose where root writes, among the safe places."""
     shared = tmp_path / "shared"
     shared.mkdir()
@@ -192,7 +194,7 @@ def test_links_that_others_can_change_are_not_followed(etc: Path, tmp_path: Path
 
 
 @needs_root
-def test_links_that_others_have_made_are_not_followed(etc: Path, tmp_path: Path) -> None:
+def test_links_that_other_users_have_made_are_not_followed(etc: Path, tmp_path: Path) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     (shared / "way").symlink_to(etc)
@@ -202,7 +204,7 @@ def test_links_that_others_have_made_are_not_followed(etc: Path, tmp_path: Path)
     assert place(shared / "way/trust.toml") == "TRUST_OPEN_TO_OTHERS"
 
 
-def test_links_to_where_others_can_write_are_not_followed(etc: Path, tmp_path: Path) -> None:
+def test_links_to_where_other_users_can_write_are_not_followed(etc: Path, tmp_path: Path) -> None:
     etc.chmod(0o777)
     (tmp_path / "way").symlink_to(etc)
     assert place(tmp_path / "way/trust.toml") == "TRUST_OPEN_TO_OTHERS"

@@ -56,7 +56,7 @@ def test_chain_does_not_begin_with_a_file_that_is_signed_falsely(anchor: Path) -
     ("suffix", "size"), [("", trust_file.MAX_BYTES), (".sig", sshsig.MAX_BYTES)]
 )
 def test_kept_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
-    """Whoever replaced it has done so on purpose."""
+    """A file that long was replaced on purpose."""
     kept = anchor.parent / "kept"
     kept.mkdir()
     following = signed(replace(TRUST, version=2), ROOT)

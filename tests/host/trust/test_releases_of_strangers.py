@@ -93,13 +93,13 @@ def test_what_the_owner_declares_void_is_forgotten() -> None:
 
 
 @pytest.mark.parametrize("fleet", ["", "survey"])
-def test_an_id_stays_with_whoever_brought_it_first_for_any_fleet(fleet: str) -> None:
+def test_an_id_stays_with_its_first_owner_for_any_fleet(fleet: str) -> None:
     found = replace(FOUND, fleet=fleet)
     assert codes(found, here(7)) == []
     assert codes(found, here(7, owner="two")) == ["ID_OWNED_BY"]
 
 
-def test_an_id_is_free_once_the_trust_file_gives_it_to_others() -> None:
+def test_an_id_is_free_once_the_trust_file_gives_it_to_other_owners() -> None:
     assert codes(FOUND, here(7, owner="former")) == []
 
 

@@ -25,7 +25,7 @@ def test_core_words_alone_are_no_matter() -> None:
 
 def test_a_near_miss_of_a_core_word_is_named() -> None:
     (warning,) = judge({"x": plugin("folowing")}).warnings
-    assert warning.code == "W-OWN-WORD"
+    assert warning.code == "PDDL_OWN_WORD"
     assert "'following'" in warning.fix
 
 
@@ -51,14 +51,16 @@ POSE, BASE = "did you mean 'pose'?", "did you mean 'base'?"
 @pytest.mark.parametrize(
     ("slot", "code", "fix"),
     [
-        pytest.param(Input("odometry", "poze"), "E-UNDECL", POSE, id="type of an input"),
-        pytest.param(Input("odometry", "pose", of="bas"), "E-UNDECL", BASE, id="of nothing"),
-        pytest.param(Input("odometry", "camera"), "E-TYPE", "", id="not a stream"),
-        pytest.param(Input("odometry", "pose", of="pose"), "E-TYPE", "", id="of what is no unit"),
+        pytest.param(Input("odometry", "poze"), "PDDL_UNKNOWN", POSE, id="type of an input"),
+        pytest.param(Input("odometry", "pose", of="bas"), "PDDL_UNKNOWN", BASE, id="of nothing"),
+        pytest.param(Input("odometry", "camera"), "PDDL_TYPE", "", id="not a stream"),
         pytest.param(
-            Output("odometry", "pose", of="bas"), "E-UNDECL", BASE, id="output of nothing"
+            Input("odometry", "pose", of="pose"), "PDDL_TYPE", "", id="of what is no unit"
         ),
-        pytest.param(Output("odometry", "poze"), "E-UNDECL", POSE, id="type of an output"),
+        pytest.param(
+            Output("odometry", "pose", of="bas"), "PDDL_UNKNOWN", BASE, id="output of nothing"
+        ),
+        pytest.param(Output("odometry", "poze"), "PDDL_UNKNOWN", POSE, id="type of an output"),
     ],
 )
 def test_a_slot_that_nothing_could_fit_is_a_problem(

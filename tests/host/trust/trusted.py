@@ -1,4 +1,4 @@
-"""A host that goes by a trust file, and drives of those whom it trusts or not."""
+"""A host with a trust file, and drives of signers that it trusts or not."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ WATCH = Behaviour("watch", "(watch ?u - detector ?i - image)", lasting=True)
 
 
 async def sees(tested: WorkersUnderTest, name: str, count: int = 30) -> FactKnown:
-    """Wait until a watcher has seen so many frames more."""
+    """Wait until a watcher has seen `count` further frames."""
     seen = sum(1 for e in tested.told(FactKnown) if e.predicate == "seen" and e.component == name)
     wanted = str((seen + 1) * 10 + count)
     return await tested.until(FactKnown, lambda e: e.arguments[:2] == (name, wanted))

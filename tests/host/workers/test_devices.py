@@ -114,9 +114,9 @@ async def test_value_can_be_withdrawn(tested: WorkersUnderTest) -> None:
 
 
 async def test_strangers_are_told_nothing(tested: WorkersUnderTest) -> None:
-    tested.workers.tell_values("nobody", [("p", (), None)])
-    await tested.workers.detach("nobody", "line")
-    await tested.workers.stop("nobody")
+    tested.workers.tell_values("stranger", [("p", (), None)])
+    await tested.workers.detach("stranger", "line")
+    await tested.workers.stop("stranger")
 
 
 GROUP = """
@@ -168,9 +168,9 @@ async def look(ctx, u):
 """
 
 
-async def test_node_is_found_by_its_own_name_in_a_room(tested: WorkersUnderTest) -> None:
+async def test_node_is_found_by_its_own_name_in_a_sandbox(tested: WorkersUnderTest) -> None:
     if tested.workers.launcher.level != Level.SANDBOXED:
-        pytest.skip("only a room has a /dev of its own")
+        pytest.skip("only a sandbox has a separate /dev")
     await tested.start("guest", NAMED, behaviours=(LOOK,), units=(Unit("port", "sensor"),))
     await tested.workers.attach("guest", "line", "/dev/kmsg", {})
     assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED

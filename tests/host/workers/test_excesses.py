@@ -154,7 +154,7 @@ async def test_worker_that_ends_by_its_limit_of_tasks_says_so(in_cgroup: Workers
     await in_cgroup.until_ready(3)
 
 
-async def test_worker_that_nobody_asks_and_spins_is_told_once(
+async def test_idle_worker_that_spins_is_told_once(
     in_cgroup: WorkersUnderTest, clock: VirtualClock
 ) -> None:
     spin = "def spin():\n    while True:\n        pass\n"

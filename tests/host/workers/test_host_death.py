@@ -46,7 +46,7 @@ import ctypes, sys, threading
 from nondum.sdk import hookimpl
 
 def hold(told):
-    sys.setswitchinterval(3600)  # whoever has the interpreter's lock keeps it
+    sys.setswitchinterval(3600)  # the thread that has the interpreter's lock keeps it
     told.touch()
     ctypes.PyDLL(None).sleep(3600)
 
@@ -59,10 +59,10 @@ async def start(ctx):
 async def daemon_with(
     folder: Path, plugin: str, level: str
 ) -> tuple[asyncio.subprocess.Process, int]:
-    """A daemon in a process of its own, and the id of its worker."""
+    """A daemon in a separate process, and the id of its worker."""
     source = folder / "source.py"
     source.write_text(plugin)
-    paths = [ROOT, *(ROOT / room for room in ("host", "planning", "transport", "wheelhouse"))]
+    paths = [ROOT, *(ROOT / part for part in ("host", "planning", "transport", "wheelhouse"))]
     daemon = await asyncio.create_subprocess_exec(
         *(sys.executable, "-c", DAEMON, str(folder), str(source)),
         stdout=asyncio.subprocess.PIPE,

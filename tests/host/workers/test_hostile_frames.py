@@ -109,7 +109,7 @@ HOSTILE: Mapping[str, tuple[str, str]] = {
         "greet(); link.send(b'\\x94\\x05\\xa1x\\xc0\\x81\\xa1a\\xd4\\x01\\x00')",
         "PROTO_VIOLATION",
     ),
-    "answer nobody waits for": ("greet(); send(REPLY, 4711, {})", "PROTO_VIOLATION"),
+    "unexpected answer": ("greet(); send(REPLY, 4711, {})", "PROTO_VIOLATION"),
     "request": ("greet(); send(REQUEST, 1, 'mount', {'node': '/dev/sda'})", "PROTO_VIOLATION"),
     "unasked descriptor": (
         "greet(); send(EVENT, 'heartbeat', None, {}, fds=[0])",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from tests.host.workers.flooding import fills_and_streams
 from tests.host.workers.streaming import sees
-from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, level, standing
+from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, confinement_state, level
 
 from nondum.host.core.events import WorkerExited, WorkerReady
 from nondum.host.sandbox.cgroups import Cgroups
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.anyio
 async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
     """Workers that share a user, also where each could have its own."""
     shared = confinement_choice.confinement(
-        replace(standing(), findings=()), (tmp_path, SDK, LIBRARIES)
+        replace(confinement_state(), findings=()), (tmp_path, SDK, LIBRARIES)
     )
     tested = WorkersUnderTest(tmp_path, confinement=shared)
     cgroups = Cgroups.open(tmp_path)
@@ -42,13 +42,13 @@ async def tested(tmp_path: Path) -> AsyncIterator[WorkersUnderTest]:
 
 
 def ways() -> list[str]:
-    """What waits in sockets that are under way is seen in a room, and in a cgroup."""
+    """What waits in sockets that are under way is seen in a sandbox, and in a cgroup."""
     hidden = level() is Level.SANDBOXED and bool(Cgroups.open(Path("/nowhere")).holds)
     return ["openly", "by_a_child", *(["in_sockets_that_are_under_way"] if hidden else [])]
 
 
 @pytest.mark.parametrize("way", ways())
-async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
+async def test_streams_of_other_workers_wait_until_the_worker_is_found_and_ended(
     tested: WorkersUnderTest, way: str
 ) -> None:
     await fills_and_streams(tested, way)
@@ -61,11 +61,9 @@ async def test_streams_of_others_wait_until_the_worker_is_found_and_ended(
     assert len([e for e in tested.told(WorkerReady) if e.component == "cam"]) == 1
 
 
-@pytest.mark.skipif(not standing().has_users, reason="workers share a user here")
+@pytest.mark.skipif(not confinement_state().has_users, reason="workers share a user here")
 @pytest.mark.parametrize("way", ways())
-async def test_nobody_waits_where_each_worker_is_a_user_of_its_own(
-    tmp_path: Path, way: str
-) -> None:
+async def test_no_worker_waits_where_each_one_is_a_separate_user(tmp_path: Path, way: str) -> None:
     tested = WorkersUnderTest(tmp_path)
     await fills_and_streams(tested, way)
     await sees(tested, "watcher")
@@ -88,7 +86,7 @@ def test_what_waits_with_a_reader_counts_for_its_sender() -> None:
 @pytest.mark.parametrize(
     ("counts", "ends", "ended"),
     [
-        pytest.param({}, {}, None, id="nobody"),
+        pytest.param({}, {}, None, id="no worker"),
         pytest.param({"a": 64}, {}, None, id="few"),
         pytest.param({"a": 65}, {}, "a", id="many"),
         pytest.param({"a": 94}, {"a": 10}, None, id="its streams explain them"),

@@ -426,7 +426,7 @@ async def test_control_characters_do_not_reach_terminals(tested: WorkersUnderTes
         pytest.param(
             "from nondum.sdk import wire\nlink().send(wire.encode(wire.Reply(9999, {})))",
             "PROTO_VIOLATION",
-            id="answer nobody waits for",
+            id="unexpected answer",
         ),
         pytest.param(
             "from nondum.sdk import wire\nlink().send(wire.encode(wire.Request(1, 'mount', {})))",
@@ -459,7 +459,7 @@ async def test_protocol_is_enforced(tested: WorkersUnderTest, body: str, code: s
     await exits_with(tested, f"{body}\nawait asyncio.sleep(60)", code)
 
 
-async def test_others_never_notice(tested: WorkersUnderTest, clock: VirtualClock) -> None:
+async def test_other_workers_never_notice(tested: WorkersUnderTest, clock: VirtualClock) -> None:
     await tested.workers.start(guest_spec(tested, "pass", name="good"))
     await guest(tested, "while True: os.write(1, b'y' * 4096)")
     do(tested)
@@ -500,7 +500,7 @@ async def test_nothing_is_inherited(
         "assert sys.flags.isolated and sys.flags.no_site and 'site' not in sys.modules\n"
         "paths = [f'/proc/self/fd/{n}' for n in os.listdir('/proc/self/fd')]\n"
         "kinds = sorted(os.readlink(p).split(':')[0] for p in paths if os.path.exists(p))\n"
-        # Its three standard files; the link; two sockets and the poller of its own loop.
+        # Its three standard files; the link; two sockets and the poller of its event loop.
         "own = ['/dev/null', 'anon_inode', 'pipe', 'pipe', 'socket', 'socket', 'socket']\n"
         "assert kinds == own, kinds"
     )

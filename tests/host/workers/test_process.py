@@ -23,7 +23,7 @@ pytestmark = pytest.mark.anyio
 
 @contextmanager
 def sleeper() -> Iterator[subprocess.Popen[bytes]]:
-    """What makes a worker's room, as it were."""
+    """A stand-in for the process that makes a worker's sandbox."""
     with subprocess.Popen(["sleep", "600"], start_new_session=True) as popen:
         try:
             yield popen
@@ -32,33 +32,33 @@ def sleeper() -> Iterator[subprocess.Popen[bytes]]:
 
 
 @contextmanager
-def keeper_that_has_said_who_it_is() -> Iterator[InitLink]:
+def identified_init() -> Iterator[InitLink]:
     """One that is this very process, and never ends before the worker."""
     orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
     with theirs:
-        theirs.send(json.dumps({"is": "keeper"}).encode())
-        keeper = InitLink(orders)
+        theirs.send(json.dumps({"is": "init"}).encode())
+        init = InitLink(orders)
         try:
-            yield keeper
+            yield init
         finally:
-            keeper.close()
+            init.close()
 
 
-async def test_worker_is_ended_where_no_descriptor_is_left_for_its_keeper() -> None:
-    with sleeper() as popen, keeper_that_has_said_who_it_is() as keeper:
-        process = WorkerProcess(popen, keeper=keeper)
+async def test_worker_is_ended_where_no_descriptor_is_left_for_its_init() -> None:
+    with sleeper() as popen, identified_init() as init:
+        process = WorkerProcess(popen, init=init)
         with descriptors_left(0):
             assert await process.end(0.0)
         assert process.exited.result() == -signal.SIGKILL
         assert not is_alive(popen.pid)
 
 
-async def test_end_is_told_where_that_of_the_room_cannot_be_watched() -> None:
+async def test_end_is_told_where_that_of_the_sandbox_cannot_be_watched() -> None:
     before = open_descriptors()
-    with sleeper() as popen, keeper_that_has_said_who_it_is() as keeper:
-        process = WorkerProcess(popen, keeper=keeper)
-        assert process.pid == popen.pid, "its keeper has been heard by now, no worker"
+    with sleeper() as popen, identified_init() as init:
+        process = WorkerProcess(popen, init=init)
+        assert process.pid == popen.pid, "only its init has said who it is by now, no worker"
         with watches_left(0):
             assert await process.end(0.0)
         assert process.exited.result() == -signal.SIGKILL

@@ -71,7 +71,7 @@ def spec(tested: WorkersUnderTest, release: str, source: str = PLUGIN) -> Worker
 
 
 async def side_by_side(tested: WorkersUnderTest) -> tuple[int, int]:
-    """Both run, the old one in force; their processes."""
+    """Both run, the old one is active; their processes."""
     await tested.workers.start(spec(tested, "old"))
     await tested.workers.start(spec(tested, "new"))
     (old,), (new,) = tested.workers.pids_of(OLD), tested.workers.pids_of(NEW)
@@ -83,7 +83,7 @@ def facts(tested: WorkersUnderTest) -> list[tuple[str, ...]]:
     return [event.arguments for event in tested.told(FactKnown)]
 
 
-async def test_worker_that_is_tried_is_not_heard_nor_asked(tested: WorkersUnderTest) -> None:
+async def test_worker_on_trial_emits_nothing_and_is_not_asked(tested: WorkersUnderTest) -> None:
     await side_by_side(tested)
     assert await tested.behave("guest", "look", u=UNIT).ended() is RunState.SUCCEEDED
     assert facts(tested) == [("old",), ("old", "none")]

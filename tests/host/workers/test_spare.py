@@ -58,7 +58,7 @@ def environment(pid: int) -> dict[str, str]:
 
 
 def ancestors(pid: int) -> set[int]:
-    """A process, and those that it comes from: in a room, what makes it and its keeper."""
+    """A process and its ancestors: in a sandbox, also the init, and what makes the sandbox."""
     found = set()
     while pid > 1:
         found.add(pid)
@@ -115,7 +115,9 @@ def test_one_that_does_not_come_to_ask_for_its_scratch_folder_is_waited_for_so_l
         spare.close()
 
 
-async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUnderTest) -> None:
+async def test_a_worker_that_was_a_spare_has_the_usual_folder_and_environment(
+    tested: WorkersUnderTest,
+) -> None:
     await tested.workers.keep_spare()
     spec = await tested.start("cam", "import os; print(os.getcwd(), dict(os.environ))\n")
     pid = tested.workers.pids()["cam"]
@@ -125,7 +127,7 @@ async def test_a_worker_that_was_a_spare_lives_where_others_do(tested: WorkersUn
     assert line.startswith(f"{spec.scratch} ")
     assert f"'HOME': '{spec.scratch}'" in line
     assert "'OMP_NUM_THREADS': '1'" in line
-    assert "NONDUM_ROOM" not in line
+    assert "NONDUM_PLACEHOLDER" not in line
 
 
 async def test_what_a_spare_forks_is_found(tested: WorkersUnderTest) -> None:
@@ -214,7 +216,7 @@ class SlowTree(NoTree):
         assert self.may_go_on.wait(PATIENCE_S)
 
 
-async def test_others_go_on_while_a_process_is_put_into_a_control_group(
+async def test_other_workers_go_on_while_a_process_is_put_into_a_control_group(
     tested: WorkersUnderTest,
 ) -> None:
     tree = SlowTree()
@@ -250,7 +252,7 @@ class ShownScratch(Entry):
 
     @property
     def maps_scratch(self) -> bool:
-        """It is, without a room for that."""
+        """It is, without a sandbox for that."""
         return True
 
 
@@ -261,7 +263,7 @@ class Showing(Unconfined):
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """The same worker."""
         with super().entry(spec, ground) as entry:
-            yield ShownScratch(entry.walls, user=os.geteuid())
+            yield ShownScratch(entry.restrictions, user=os.geteuid())
 
 
 async def test_launch_that_is_not_wanted_any_more_while_it_waits_for_a_mount_leaves_nothing(
@@ -290,7 +292,7 @@ async def test_launch_that_is_not_wanted_any_more_while_it_waits_for_a_mount_lea
 
 
 def spares(scratches: Path) -> list[int]:
-    """Interpreters that wait to become workers of a daemon, and in rooms what makes these."""
+    """Interpreters that wait to become workers of a daemon, and what makes their sandboxes."""
     return [int(each.name) for each in Path("/proc").glob("[0-9]*") if is_spare(each, scratches)]
 
 

@@ -1,4 +1,4 @@
-"""Frames between real workers: wired by what a call reads, dropped for whoever cannot keep up."""
+"""Frames between real workers: wired by what a call reads, dropped for slow consumers."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ async def test_swapping_the_argument_swaps_the_feed(tested: WorkersUnderTest) ->
 
 
 @pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL], ids=lambda n: n.name)
-async def test_dead_consumer_costs_nobody_anything(
+async def test_dead_consumer_holds_up_no_other_one(
     tested: WorkersUnderTest, number: signal.Signals
 ) -> None:
     await camera(tested)
@@ -112,7 +112,7 @@ async def test_stream_is_unwired_when_the_call_ends(tested: WorkersUnderTest) ->
     assert status.readers == ()
 
 
-async def test_stream_of_nobody_fails_the_call(tested: WorkersUnderTest) -> None:
+async def test_unknown_stream_fails_the_call(tested: WorkersUnderTest) -> None:
     await tested.start("one", WATCHER, behaviours=(WATCH,), units=(Unit("eye", "detector"),))
     call = tested.behave("one", "watch", u=f"{HOST}__one__eye", i=frames("gone"))
     assert await call.ended() is RunState.FAILED
@@ -171,7 +171,7 @@ async def test_claims_hold_what_was_said_before_anybody_listened(tested: Workers
     await tested.until(StreamFlowing)
     stream = f"{HOST}__base__odometry"
     assert tested.workers.claims("base") == (StreamFlowing("base", stream, True),)
-    assert tested.workers.claims("nobody") == ()
+    assert tested.workers.claims("stranger") == ()
 
 
 async def test_calls_are_established_only_by_themselves(tested: WorkersUnderTest) -> None:

@@ -1,4 +1,4 @@
-"""Cgroups that hold nobody, and fail as those of a host that has run short of something."""
+"""Cgroups that hold no process, and fail as those of a host that has run short of something."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
     {"id": 1, "status": 0, "out": "…", "err": "…"}          (base64; status 124: it took too long)
     {"id": 2, "put": "/etc/nondum/host.toml", "data": "…", "mode": 420}
 
-Each request has a thread of its own, so that one may watch while another acts.
+Each request runs in its own thread, so that one may watch while another acts.
 """
 
 import base64
@@ -42,7 +42,7 @@ def main() -> None:
     pending = b""
     while True:
         chunk = os.read(line, 65536)
-        if not chunk:  # nobody is at the other end
+        if not chunk:  # no process is at the other end
             time.sleep(0.1)
         *lines, pending = (pending + chunk).split(b"\n")
         for request in lines:

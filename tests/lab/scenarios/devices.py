@@ -81,7 +81,7 @@ def _seen_through(lab: Lab, host: Installed) -> str:
     stick = host.bring(lab.stick("instruments", *COMPONENTS), "org.example.instruments")
     told = {id: until_said(host, id, "opened", least) for id, least in GRANTED.items()}
     _see_left_alone(host)
-    for id, least in GRANTED.items():  # by the workers of the daemon that was started anew
+    for id, least in GRANTED.items():  # by the workers of the daemon that was started again
         until_said(host, id, "opened", least)
     _see_users(machine)
     tablet, *others = plugged
@@ -99,7 +99,7 @@ def _seen_through(lab: Lab, host: Installed) -> str:
 
 
 def _see_users(machine: Machine) -> None:
-    """Each worker is a user of its own, and nothing that the helper does for it is forbidden it."""
+    """Each worker runs as a different user, and no system call of the helper was refused."""
     users = {int(user) for user in machine.run(USERS).split()}
     own = users.intersection(worker_users.OF_SERVICE)
     assert len(own) >= len(GRANTED), f"processes of the service run as {sorted(users)}"
@@ -121,7 +121,7 @@ def _see_node_go(machine: Machine, tablet: str) -> None:
 
 
 def _see_left_alone(host: Installed) -> None:
-    """Nothing that nobody has is opened while a daemon starts and grants the rest anew."""
+    """Devices that no component has stay closed while a daemon starts and grants the rest again."""
     machine = host.machine
     rows: list[dict[str, Any]] = machine.attempt("nondum devices --json").json()
     kinds = {one["kind"]: row for row in rows for one in row.get("interfaces", ())}

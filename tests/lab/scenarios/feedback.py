@@ -109,14 +109,16 @@ def _bring(machine: Machine, image: Path, lamp: str) -> str:
 def _dance_for_a_goal(lab: Lab, host: Installed, lamp: str) -> None:
     """The goal comes first, and waits for the payload that knows its words."""
     files = lab.folder()
-    goal_payload.write(files / "files", "org.example.errand", ["dance"])
-    errand = host.bring(fat_stick(files / "errand.img", files / "files"), "org.example.errand")
+    goal_payload.write(files / "files", "org.example.delivery", ["dance"])
+    delivery = host.bring(
+        fat_stick(files / "delivery.img", files / "files"), "org.example.delivery"
+    )
     _until_shown(host.machine, lamp, State.HELP)
     dancer = host.bring(
         lab.stick("dancer", Part("dancer", DANCER), release=2), "org.example.dancer"
     )
     host.until_goal("dance", "holds")
-    host.machine.pull(errand)
+    host.machine.pull(delivery)
     host.until_goal("dance", "halted")
     host.machine.pull(dancer)
     host.until_payload("org.example.dancer", "gone")

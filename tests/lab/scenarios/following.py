@@ -17,7 +17,7 @@ from demo.stage import Mark
 from demo.stages import HOLD_S, withdraw
 from tests.lab import demonstration as shown
 from tests.lab.body import Body
-from tests.lab.demonstration import Heard
+from tests.lab.demonstration import FollowedStream
 from tests.lab.lab import Lab
 from tests.lab.robot import MachineRobot
 
@@ -54,7 +54,7 @@ def run(lab: Lab) -> str:
 def _followed(robot: MachineRobot, kit: Kit) -> list[str]:
     """I, the camera pulled and put back, II, and how those went."""
     body = Body(robot.host, Reference.read(REFERENCE), SPEED)
-    start_rad = body.until_standing()
+    start_rad = body.until_still()
     for name in FIRST:
         robot.plug(kit.drives[name])
     robot.nondum("goal", FOLLOW)
@@ -64,7 +64,7 @@ def _followed(robot: MachineRobot, kit: Kit) -> list[str]:
         if name != CAMERA:
             withdraw(robot, kit.drives[CAMERA])
             robot.host.until_goal(FOLLOW, "suspended")
-        start_rad = body.until_standing()
+        start_rad = body.until_still()
         robot.plug(kit.drives[name])
         notes.append(f"{stage}: ahead in {_share(robot, body, start_rad):.0%}")
     return notes
@@ -72,7 +72,7 @@ def _followed(robot: MachineRobot, kit: Kit) -> list[str]:
 
 def _share(robot: MachineRobot, body: Body, start_rad: float) -> float:
     robot.host.until_goal(FOLLOW, "holds")
-    return body.until_following(Heard(robot.host, "image"), start_rad)
+    return body.until_following(FollowedStream(robot.host, "image"), start_rad)
 
 
 def _lost(robot: MachineRobot, body: Body, kit: Kit) -> str:
@@ -83,7 +83,7 @@ def _lost(robot: MachineRobot, body: Body, kit: Kit) -> str:
     robot.pull(kit.drives[CAMERA].name)
     robot.host.until_goal(FOLLOW, "suspended")
     moved = body.moved(body.now_s() + BRAKE_S, STAND_S)
-    assert moved.is_standing, f"the body went on: {moved}"
+    assert moved.is_still, f"the body went on: {moved}"
     fall = Fall.of(mark.journal())
     first = next(n for n, step in enumerate(steps) if step["component"] == CAMERA)
     others = {step["component"] for step in steps} - {CAMERA}

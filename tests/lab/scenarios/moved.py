@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from tests.lab.gauge import UsageReader, reader, switched_on
+from tests.lab.gauge import Gauge, reader, switched_on
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
 
@@ -37,8 +37,8 @@ def run(lab: Lab) -> str:
         nodes.append(_read(host, gauge))
         assert nodes[-1] != nodes[-2], f"it has the name it had: {nodes}"
         opened = _openers(host, _node(host, "STRANGER"))
-        assert not opened, f"somebody opened the stranger: {opened}"
-        assert _openers(host, nodes[-1]), "nobody is seen to have the gauge open"
+        assert not opened, f"a process opened the stranger: {opened}"
+        assert _openers(host, nodes[-1]), "no process has the gauge open"
         for name in (line, stranger):
             machine.pull_line(name)
         _told(host)
@@ -47,9 +47,9 @@ def run(lab: Lab) -> str:
     return f"nodes {', '.join(nodes)}"
 
 
-def _read(host: Installed, gauge: UsageReader) -> str:
-    """What the gauge counts now is heard, which nobody could know who does not read its line;
-    answers its node."""
+def _read(host: Installed, gauge: Gauge) -> str:
+    """Wait until its stream carries what the gauge counts now, which only its line tells; answers
+    its node."""
     before = gauge.count
     host.until_goal(GOAL, "holds")
     follow = "nondum streams --follow spot__gauge__level --count 1 --json"
@@ -67,7 +67,7 @@ def _read(host: Installed, gauge: UsageReader) -> str:
 
 
 def _told(host: Installed) -> None:
-    """The behaviour was told, and whoever asks is told what is missing."""
+    """See that the behaviour ended, and that `nondum why` says what is missing."""
     host.until_component("gauge", WAITS)
     host.until_goal(GOAL, "suspended")
     said = host.machine.run(f'nondum why "{GOAL}"; nondum why')
@@ -87,7 +87,7 @@ def _node(host: Installed, serial: str) -> str:
 
 
 def _openers(host: Installed, node: str) -> str:
-    """Descriptors of that device, whatever it is called in the rooms of workers."""
+    """Open descriptors of that device, whatever it is called in the sandboxes of workers."""
     number = host.machine.run(f"stat -c %t:%T {node}").strip()
     every = "stat -L -c '%t:%T %n' /proc/[0-9]*/fd/* 2>/dev/null"
     return host.machine.attempt(f"{every} | grep '^{number} '").out.strip()

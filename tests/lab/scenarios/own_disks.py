@@ -21,7 +21,7 @@ UNIT = """
 What=/dev/disk/by-label/KEPT
 Where=/srv/kept
 """
-"""Wanted by nobody: it is not mounted."""
+"""No unit wants it: it is not mounted."""
 OWN = ("data", "blank", "swap", "kept")
 """What of it could be plugged in: two partitions, and two disks without any."""
 DISKS = 1
@@ -67,7 +67,7 @@ def _left_alone(view: dict[str, Any]) -> list[str] | None:
 
 
 def _see_untouched(host: Followed) -> None:
-    """They are in use as before, can be written to, are no drives, and nobody read of them."""
+    """See that they are in use as before, can be written to, are no drives, and were not read."""
     assert _in_use(host)
     host.machine.run("echo well >/srv/data/letter && sync && rm /srv/data/letter")
     host.machine.run("cat /sys/class/block/sd*/ro | sort | uniq -c")

@@ -47,7 +47,7 @@ def run(lab: Lab) -> str:
 
 
 def _dpkg(machine: Machine, words: str) -> float:
-    """Run dpkg with nobody to ask; answers how many seconds that took."""
+    """Run dpkg without questions to a person; answers how many seconds that took."""
     uptime = "cut -d' ' -f1 /proc/uptime"
     before = float(machine.run(uptime))
     machine.run(f"DEBIAN_FRONTEND=noninteractive dpkg {words}", timeout_s=INSTALLING_S)

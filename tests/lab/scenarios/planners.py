@@ -1,4 +1,4 @@
-"""Every planner plans as the daemon's user, held by all that holds the daemon's unit."""
+"""Every planner plans as the daemon's user, with the restrictions of the daemon's unit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DOMAIN = """(define (domain lamps) (:requirements :strips) (:predicates (lit ?l)
  (:action light :parameters (?l) :precondition (and (at ?l) (has ?l)) :effect (lit ?l)))"""
 PROBLEM = """(define (problem two) (:domain lamps) (:objects a b c)
  (:init (at a) (has b) (has c)) (:goal (and (lit b) (lit c))))"""
-SAME_WALLS = """
+SAME_LIMITS = """
 set -eu
 sed -e '/^ExecStart=/d' -e '/^Restart/d' -e '/^TimeoutStop/d' -e '/^State/d' -e '/^Runtime/d' \
     /etc/systemd/system/nondum.service >/run/systemd/system/nondum-plans.service
@@ -25,15 +25,15 @@ systemctl daemon-reload
 systemctl start nondum-plans.service
 cat /run/plan.json
 """
-"""Has a planner run once as the daemon's user, with all that holds the daemon."""
+"""Runs a planner once as the daemon's user, with the restrictions of the daemon's unit."""
 
 
 def run(lab: Lab) -> str:
-    """Run each once in a unit like the daemon's; each is a process of its own, or several."""
+    """Run each once in a unit like the daemon's; each is a separate process, or several."""
     machine = lab.booted_once().machine
     machine.put("/etc/plans/d.pddl", DOMAIN)
     machine.put("/etc/plans/p.pddl", PROBLEM)
     for planner in PLANNERS:
-        said = machine.run(SAME_WALLS.format(planner=planner))
+        said = machine.run(SAME_LIMITS.format(planner=planner))
         assert "light" in said, f"{planner}: {said}"
     return ", ".join(PLANNERS)

@@ -13,7 +13,7 @@ DROP_IN = f"/etc/systemd/system/{SERVICE}.d/watched.conf"
 
 
 def run(lab: Lab) -> str:
-    """Start the machine anew; kill the daemon again and again; stop it, so that it hangs."""
+    """Restart the machine; kill the daemon again and again; stop it, so that it hangs."""
     host = lab.booted()
     host.machine.put(DROP_IN, "[Service]\nWatchdogSec=60\n")
     host.machine.reset()

@@ -65,8 +65,8 @@ def _idle(count: int, view: dict[str, Any]) -> bool | None:
 
 
 def _next(host: Followed, before: str) -> str:
-    """What the only drive is called (its node, and the number of its insertion), once it is another
-    one than before, has been read, and nobody else is there."""
+    """The name of the only drive (its node and the number of its insertion), once it is another one
+    than before, and has been read."""
 
     def found(view: dict[str, Any]) -> str | None:
         (drive,) = view["drives"] if len(view["drives"]) == 1 else ({"drive": before},)

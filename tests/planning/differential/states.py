@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from hypothesis import assume
 from tests.planning.differential.semantics import Problem, State, TooManyStates, reachable
 
-from nondum.planning.ground.draft import drafted
 from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.literal_task import expanded
 from nondum.planning.ground.negation import positive_task
 from nondum.planning.workbench.standalone import Standalone
 from nondum.sdk.planner import GroundTask
@@ -22,7 +22,7 @@ MOST_STATES = 150
 def all_that_can_be_done(loaded: Standalone) -> GroundTask:
     """The task with what does not help, too."""
     found = explore(loaded.merged, loaded.facts)
-    return positive_task(drafted(loaded.merged, found, loaded.goal), found.table)
+    return positive_task(expanded(loaded.merged, found, loaded.goal), found.table)
 
 
 def small(problem: Problem) -> Graph:

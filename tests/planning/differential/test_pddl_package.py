@@ -107,6 +107,6 @@ def test_what_both_accept_is_the_same(text: Text) -> None:
     ],
     ids=["predicate", "variable", "twice", "cut off", "section"],
 )
-def test_what_is_wrong_is_refused_whoever_reads_it(domain: str) -> None:
+def test_what_is_wrong_is_refused_by_every_reader(domain: str) -> None:
     with pytest.raises(FragmentRefused):
         load_domain(domain, "d")

@@ -50,14 +50,14 @@ def test_a_name_that_is_none_is_refused_instead_of_losing_the_plan(name: str) ->
     code, words = refusal(
         ROADS, f"(:objects {name} c) (:init (at {name}) (road {name} c)) (:goal (at c))"
     )
-    assert code == "E-SYNTAX"
+    assert code == "PDDL_SYNTAX"
     assert f"found '{name[1:]}'" in words
 
 
 def test_types_in_a_circle_are_refused_at_once() -> None:
     with pytest.raises(FragmentRefused) as refused:
         load_domain("(define (domain t) (:types a - b b - a))", "t.pddl")
-    assert refused.value.code == "E-TYPE-CYCLE"
+    assert refused.value.code == "PDDL_TYPE_CYCLE"
     assert "a - b, b - a" in str(refused.value)
 
 
@@ -166,11 +166,11 @@ def test_functions_metric_and_rules() -> None:
 @pytest.mark.parametrize(
     ("init", "goal", "code", "words"),
     [
-        ("(att a)", "(at b)", "E-UNDECL", "nobody declares predicate 'att'"),
-        ("(at a b)", "(at b)", "E-PRED-ARITY", "(at a b) has 2 arguments"),
-        ("(at a)", "(at c)", "E-UNDECL", "nobody declares 'c'"),
-        ("(at c)", "(at b)", "E-UNDECL", "nobody declares 'c'"),
-        ("(at ?x)", "(at b)", "E-UNDECL", "?x is not a parameter"),
+        ("(att a)", "(at b)", "PDDL_UNKNOWN", "predicate 'att' is not declared"),
+        ("(at a b)", "(at b)", "PDDL_ARITY", "(at a b) has 2 arguments"),
+        ("(at a)", "(at c)", "PDDL_UNKNOWN", "'c' is not declared"),
+        ("(at c)", "(at b)", "PDDL_UNKNOWN", "'c' is not declared"),
+        ("(at ?x)", "(at b)", "PDDL_UNKNOWN", "?x is not a parameter"),
     ],
     ids=["predicate", "arity", "object in goal", "object in init", "variable in init"],
 )
@@ -183,10 +183,10 @@ def test_words_of_a_problem_that_mean_nothing(init: str, goal: str, code: str, w
 @pytest.mark.parametrize(
     ("condition", "code", "words"),
     [
-        ("(and (at ?x) (road ?x ?z))", "E-UNDECL", "?z is not a parameter"),
-        ("(and (at ?x) (road ?x home))", "E-UNDECL", "nobody declares 'home'"),
-        ("(and (at ?x) (rode ?x ?y))", "E-UNDECL", "nobody declares predicate 'rode'"),
-        ("(and (at ?x) (road ?x))", "E-PRED-ARITY", "(road ?x) has 1 arguments"),
+        ("(and (at ?x) (road ?x ?z))", "PDDL_UNKNOWN", "?z is not a parameter"),
+        ("(and (at ?x) (road ?x home))", "PDDL_UNKNOWN", "'home' is not declared"),
+        ("(and (at ?x) (rode ?x ?y))", "PDDL_UNKNOWN", "predicate 'rode' is not declared"),
+        ("(and (at ?x) (road ?x))", "PDDL_ARITY", "(road ?x) has 1 arguments"),
     ],
     ids=["variable", "constant", "predicate", "arity"],
 )
@@ -201,7 +201,7 @@ def test_an_argument_of_the_wrong_type() -> None:
     domain = """(:types cup ball) (:predicates (full ?c - cup))
         (:action fill :parameters (?b - ball) :precondition () :effect (full ?b))"""
     code, words = refusal(domain, "(:objects c - cup) (:init) (:goal (full c))")
-    assert code == "E-TYPE"
+    assert code == "PDDL_TYPE"
     assert "expected cup, ?b is ball" in words
 
 
@@ -209,7 +209,7 @@ def test_an_object_that_is_a_constant_of_another_type() -> None:
     domain = """(:types cup ball) (:constants x - cup) (:predicates (full ?c - cup))
         (:action fill :parameters (?c - cup) :precondition () :effect (full ?c))"""
     code, words = refusal(domain, "(:objects x - ball) (:init) (:goal (full x))")
-    assert code == "E-TWICE"
+    assert code == "PDDL_TWICE"
     assert "'x' has another type" in words
 
 

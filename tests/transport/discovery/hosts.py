@@ -1,5 +1,6 @@
-"""Hosts that look for each other, for the tests: in this process, or in one of their own, as on a
-machine of a network of namespaces.
+"""Hosts that look for each other, for the tests.
+
+They run in this process, or each in a separate process in a network namespace.
 
 python -m tests.transport.discovery.hosts CONFIG     # looks until its standard input ends
 """
@@ -30,7 +31,7 @@ PATIENCE_S = 60.0
 
 @dataclass
 class Seeker:
-    """A host in this process, and whom it was told of."""
+    """A host in this process, and the hints that it got."""
 
     announcement: Announcement
     discovery: Discovery = field(init=False)
@@ -57,7 +58,7 @@ class Seeker:
 
 
 def free_port() -> int:
-    """A port that nobody has, neither for TCP nor for UDP."""
+    """A port that no program uses, neither for TCP nor for UDP."""
     while True:
         with (
             socket.create_server(("127.0.0.1", 0)) as tcp,
@@ -70,7 +71,7 @@ def free_port() -> int:
 
 
 def here(name: str, *, epoch: int = 1, key: str = "") -> Announcement:
-    """A host that listens on this machine only, with a key of its own."""
+    """A host that listens on this machine only, with a new key unless one is given."""
     known = PeerKey(key) if key else HostKeys.generate().public
     return Announcement(known, name, epoch, (f"tcp://127.0.0.1:{free_port()}",))
 
@@ -90,7 +91,7 @@ async def seeking(announcement: Announcement, **options: Any) -> AsyncIterator[S
 
 
 class Host:
-    """A host on a machine of its own, and whom it was told of."""
+    """A host on a separate machine (network namespace), and the hints that it got."""
 
     def __init__(self, machine: Machine, **config: Any) -> None:
         """`config`: static, multicast, port, key, epoch."""

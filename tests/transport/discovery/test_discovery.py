@@ -57,8 +57,8 @@ async def test_hosts_find_each_other_in_both_directions() -> None:
         assert rover.announcement.key not in rover.discovery.hints
 
 
-async def test_host_that_is_heard_while_this_one_starts_is_told() -> None:
-    """It says the same again a second later, but zeroconf may take that for a duplicate."""
+async def test_host_that_announces_itself_during_the_start_is_reported() -> None:
+    """It announces itself again a second later, but zeroconf may drop that as a duplicate."""
     base, hints = here("base"), asyncio.Queue[Hint]()
     multicast = Multicast(
         base.security,
@@ -87,8 +87,10 @@ async def test_a_goodbye_ends_the_hint() -> None:
         assert base.announcement.key not in rover.discovery.hints
 
 
-async def test_a_host_that_is_heard_no_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever is killed says no goodbye, and multicast DNS would believe in him for an hour."""
+async def test_a_host_that_no_longer_announces_itself_is_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A killed host says no goodbye, and multicast DNS would keep it for an hour."""
     monkeypatch.setattr("nondum.transport.discovery.discovery.AGAIN_S", 0.1)
     monkeypatch.setattr("nondum.transport.discovery.discovery.SILENT_S", 1.0)
     killed = here("killed")
@@ -112,7 +114,7 @@ async def test_what_changes_is_told() -> None:
         await rover.told(lambda hint: hint.key == base.key and hint.pairing_port is None)
 
 
-async def test_hosts_without_keys_find_each_other_and_nobody_else() -> None:
+async def test_hosts_without_keys_find_only_each_other() -> None:
     async with (
         seeking(here("rover", key="development:rover")) as rover,
         seeking(here("base", key="development:base")) as base,
@@ -125,7 +127,7 @@ async def test_hosts_without_keys_find_each_other_and_nobody_else() -> None:
         assert not {rover.announcement.key, base.announcement.key} & secured.discovery.hints.keys()
 
 
-async def test_without_multicast_nobody_is_heard_or_told() -> None:
+async def test_without_multicast_no_host_is_found() -> None:
     async with (
         seeking(here("rover")) as rover,
         seeking(here("quiet"), multicast=False) as quiet,
@@ -151,7 +153,7 @@ async def test_the_own_echo_is_no_copy() -> None:
         assert rover.discovery.status().problems == ()
 
 
-async def test_the_status_tells_what_was_announced_and_heard_and_where() -> None:
+async def test_the_status_has_sent_and_received_announcements_by_interface() -> None:
     async with seeking(here("rover")) as rover, seeking(here("base")) as base:
         await rover.found(base)
         (row,) = (one for one in rover.discovery.status().interfaces if one.is_looked_on)

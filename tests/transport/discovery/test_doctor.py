@@ -42,7 +42,7 @@ def test_an_interface_is_judged_by_its_state(
     assert (found.fix == "") == (result is Result.OK)
 
 
-def test_bridges_for_containers_are_not_looked_on_where_there_are_others() -> None:
+def test_bridges_for_containers_are_used_only_without_another_interface() -> None:
     docker = Interface("docker0", 3, ON, ADDRESS)
     assert looked_on([docker, Interface("eth0", 2, ON, ADDRESS)])[0].name == "eth0"
     assert looked_on([docker]) == (docker,)

@@ -38,7 +38,7 @@ def read(txt: dict[str, str], *, port: int | None = 7410, near: tuple[str, ...] 
         st.lists(numbers, min_size=1, max_size=16).map(tuple),
     )
 )
-def test_what_a_host_announces_is_what_others_read(here: Announcement) -> None:
+def test_a_peer_reads_what_a_host_announces(here: Announcement) -> None:
     hint = read(to_txt(here), port=here.port, near=("10.77.0.2",))
     assert (hint.key, hint.name, hint.epoch) == (here.key, here.name, here.epoch)
     assert (hint.pairing_port, hint.versions) == (here.pairing_port, here.versions)

@@ -17,7 +17,7 @@ from nondum.transport.peers.keys import PeerKey
 OWN = PeerKey("own")
 
 
-def book(*preferred: str) -> HintTable:
+def table(*preferred: str) -> HintTable:
     return HintTable(OWN, 1, lambda key: key in preferred, 0.0)
 
 
@@ -26,21 +26,21 @@ def hint(key: str, *addresses: str, source: Source = Source.MULTICAST, epoch: in
 
 
 def test_a_new_hint_is_told_and_the_same_again_is_not() -> None:
-    here, rover = book(), hint("rover")
+    here, rover = table(), hint("rover")
     assert here.add(rover, 0.0) == Change(told=rover)
     assert here.add(rover, 1.0) == Change()
-    assert here.heard[0].at_s == 1.0
+    assert here.received[0].at_s == 1.0
 
 
 def test_what_changes_is_told_again() -> None:
-    here = book()
+    here = table()
     here.add(hint("rover"), 0.0)
     restarted = hint("rover", epoch=2)
     assert here.add(restarted, 1.0) == Change(told=restarted)
 
 
 def test_addresses_of_both_sources_are_told_the_given_first() -> None:
-    here = book()
+    here = table()
     here.add(hint("rover", "tcp://10.0.0.1:7410"), 0.0)
     static = hint("rover", "tcp://192.168.0.1:7410", source=Source.STATIC)
     told = here.add(static, 1.0).told
@@ -48,17 +48,17 @@ def test_addresses_of_both_sources_are_told_the_given_first() -> None:
 
 
 def test_a_peer_is_gone_when_nothing_hints_at_it_any_more() -> None:
-    here = book()
-    heard, asked = hint("rover"), hint("rover", source=Source.STATIC)
-    here.add(heard, 0.0)
+    here = table()
+    received, asked = hint("rover"), hint("rover", source=Source.STATIC)
+    here.add(received, 0.0)
     here.add(asked, 0.0)
-    assert here.remove(heard.key, Source.MULTICAST).gone is None
-    assert here.remove(heard.key, Source.STATIC) == Change(gone=heard.key)
-    assert here.remove(heard.key, Source.STATIC) == Change()
+    assert here.remove(received.key, Source.MULTICAST).gone is None
+    assert here.remove(received.key, Source.STATIC) == Change(gone=received.key)
+    assert here.remove(received.key, Source.STATIC) == Change()
 
 
 def test_the_own_echo_is_nothing_and_another_life_under_the_own_key_is_a_problem() -> None:
-    here = book()
+    here = table()
     assert here.add(hint("own"), 0.0) == Change()
     assert here.problem() is None
     assert here.add(hint("own", "tcp://10.0.0.9:7410", epoch=2), 0.0) == Change()
@@ -81,8 +81,8 @@ def test_without_keys_another_host_of_the_own_name_is_told_as_that() -> None:
     assert here.problem() is None
 
 
-def test_ten_thousand_invented_hosts_push_out_nobody_who_matters() -> None:
-    here = book("friend")
+def test_ten_thousand_invented_hosts_push_out_no_preferred_or_static_host() -> None:
+    here = table("friend")
     here.add(hint("friend"), 0.0)
     here.add(hint("given", source=Source.STATIC), 0.0)
     for number in range(10_000):
@@ -93,16 +93,16 @@ def test_ten_thousand_invented_hosts_push_out_nobody_who_matters() -> None:
 
 
 def test_a_friend_gets_in_however_crowded_it_is() -> None:
-    here = book("friend")
+    here = table("friend")
     for number in range(2 * MAX_PEERS):
         here.add(hint(f"invented-{number}"), 0.0)
     change = here.add(hint("friend"), 0.0)
     assert change.told is not None
-    assert change.gone == "invented-0"  # the oldest makes room
+    assert change.gone == "invented-0"  # the oldest is dropped for it
 
 
 def test_a_stranger_gets_in_once_the_flood_is_over() -> None:
-    here = book()
+    here = table()
     for number in range(2 * MAX_PEERS):
         here.add(hint(f"invented-{number}"), 0.0)
     assert here.add(hint("rover"), 0.0).told is None
@@ -117,14 +117,14 @@ def test_where_everybody_matters_the_last_to_come_stays_out() -> None:
     assert here.refused["HINT_CROWDED"] == 1
 
 
-class Telling(RuleBasedStateMachine):
-    """Whoever follows what is told knows what the book has."""
+class HintChanges(RuleBasedStateMachine):
+    """A subscriber that follows the changes knows what the table has."""
 
     keys = Bundle("keys")
 
     def __init__(self) -> None:
         super().__init__()
-        self.book = book("key-0")
+        self.table = table("key-0")
         self.followed: dict[PeerKey, Hint] = {}
         self.now_s = 0.0
 
@@ -147,16 +147,16 @@ class Telling(RuleBasedStateMachine):
     )
     def hear(self, key: PeerKey, source: Source, epoch: int, addresses: list[int]) -> None:
         places = [f"tcp://10.0.0.{number}:7410" for number in addresses]
-        self.follow(self.book.add(hint(key, *places, source=source, epoch=epoch), self.now_s))
+        self.follow(self.table.add(hint(key, *places, source=source, epoch=epoch), self.now_s))
 
     @rule(key=keys, source=st.sampled_from(Source))
     def forget(self, key: PeerKey, source: Source) -> None:
-        self.follow(self.book.remove(key, source))
+        self.follow(self.table.remove(key, source))
 
     @rule(start=st.integers(0, 1000), count=st.integers(1, 600))
     def flood(self, start: int, count: int) -> None:
         for number in range(start, start + count):
-            self.follow(self.book.add(hint(f"key-{number}"), self.now_s))
+            self.follow(self.table.add(hint(f"key-{number}"), self.now_s))
 
     @rule(seconds=st.floats(0, 60))
     def wait(self, seconds: float) -> None:
@@ -164,13 +164,13 @@ class Telling(RuleBasedStateMachine):
 
     @invariant()
     def is_followed(self) -> None:
-        assert self.book.hints == self.followed
+        assert self.table.hints == self.followed
 
     @invariant()
     def is_bounded(self) -> None:
-        assert len(self.book.hints) <= MAX_PEERS
-        assert all(len(one.addresses) <= MAX_ADDRESSES for one in self.book.hints.values())
+        assert len(self.table.hints) <= MAX_PEERS
+        assert all(len(one.addresses) <= MAX_ADDRESSES for one in self.table.hints.values())
 
 
-TestTelling = Telling.TestCase
-TestTelling.settings = settings(a_share(4), stateful_step_count=20)
+TestHintChanges = HintChanges.TestCase
+TestHintChanges.settings = settings(a_share(4), stateful_step_count=20)

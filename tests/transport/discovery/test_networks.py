@@ -49,7 +49,7 @@ def test_a_new_name_is_announced(network: Network) -> None:
     rover.next("hint", key=base.key, name="camp")
 
 
-def test_a_host_that_starts_anew_has_another_epoch(network: Network) -> None:
+def test_a_restarted_host_has_another_epoch(network: Network) -> None:
     here, there = network.lan("rover", "base")
     rover, base = Host(here), Host(there)
     rover.hears(base)
@@ -79,7 +79,7 @@ class TestSeveralNetworks:
         base.hears(rover)
 
     def test_halves_of_a_network_that_meet_find_each_other(self, network: Network) -> None:
-        """No link goes down, and nobody starts: only announcing again and again can help."""
+        """No link goes down, and no host starts: only announcing again and again can help."""
         here, there = network.lan("rover", "base")
         network.switches[0].split([there.cables[0]])
         rover, base = Host(here), Host(there)

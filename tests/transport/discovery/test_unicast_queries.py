@@ -41,7 +41,7 @@ def at(announcement: Announcement) -> str:
 
 
 class Asking(asyncio.DatagramProtocol):
-    """Somebody who asks by hand."""
+    """A socket that asks by hand."""
 
     def __init__(self) -> None:
         self.answers: asyncio.Queue[bytes] = asyncio.Queue()
@@ -117,8 +117,8 @@ async def test_a_host_that_answers_no_more_is_gone() -> None:
         await rover.lost(base.key)
 
 
-async def test_a_name_that_nobody_has_is_told() -> None:
-    async with seeking(here("rover"), multicast=False, static=["nobody.invalid"]) as rover:
+async def test_an_unknown_host_name_is_reported() -> None:
+    async with seeking(here("rover"), multicast=False, static=["unknown.invalid"]) as rover:
         told = await row(rover, code="STATIC_UNKNOWN")
         assert told.problem is not None and "peers.static" in told.problem.fix
 
@@ -147,7 +147,7 @@ async def test_a_name_is_resolved_once_there_are_threads_again(clock: VirtualClo
         await clock.advance_until(rover.found(there))
 
 
-async def test_a_host_that_was_given_itself_finds_nobody() -> None:
+async def test_a_host_with_itself_as_static_host_finds_no_peer() -> None:
     rover = here("rover")
     async with seeking(rover, multicast=False, static=[at(rover)]) as seeker:
         await until_async("the name", lambda: seeker.discovery.status().static[0].name == "rover")
@@ -155,7 +155,7 @@ async def test_a_host_that_was_given_itself_finds_nobody() -> None:
         assert seeker.discovery.status().problems == ()
 
 
-async def test_without_keys_nobody_beyond_this_machine_is_asked() -> None:
+async def test_without_keys_only_this_machine_is_asked() -> None:
     rover = here("rover", key="development:rover")
     async with seeking(rover, multicast=False, static=["192.0.2.1"]) as seeker:
         told = await row(seeker, code="STATIC_UNKNOWN")
@@ -216,7 +216,7 @@ class TestStrangers:
             transport.close()
             assert stranger.answers.qsize() < 2 * BURST
 
-    async def test_whoever_has_not_seen_the_question_cannot_answer(self) -> None:
+    async def test_a_sender_that_has_not_seen_the_question_cannot_answer(self) -> None:
         port = free_port()
         loop = asyncio.get_running_loop()
         liar, _ = await loop.create_datagram_endpoint(Liar, local_addr=("127.0.0.1", port))

@@ -103,7 +103,7 @@ class World(Protocol):
     def child(
         self, name: str, keys: HostKeys, entries: Mapping[str, Body]
     ) -> contextlib.AbstractContextManager[subprocess.Popen[str]]:
-        """A host in a process of its own."""
+        """A host in a separate process."""
 
     def close(self) -> None:
         """End what was between the hosts."""

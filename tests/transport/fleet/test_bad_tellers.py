@@ -40,14 +40,14 @@ CAMERA = {"component/camera": {"units": ["camera"]}}
 
 @dataclass
 class Teller:
-    """Answers for a catalogue, or never does."""
+    """Answers requests for a catalogue, or never does."""
 
     ledger: Ledger = field(default_factory=lambda: Ledger(7))
     is_mute: bool = False
     asked: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def serve(self, errand: IncomingCall) -> Body | Awaitable[Body]:
-        assert errand.method == READ
+    def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
+        assert incoming.method == READ
         self.asked.set()
         if self.is_mute:
             return self._never()
@@ -56,7 +56,7 @@ class Teller:
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None: ...
 
-    def orphaned(self, errand: IncomingCall, reason: Loss) -> Lease:
+    def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
         return Lease.STOP
 
     async def _never(self) -> Body:
@@ -65,7 +65,7 @@ class Teller:
 
 
 class LyingLedger(Ledger):
-    """Says that it has told other entries than it tells."""
+    """Tells a digest that does not match its entries."""
 
     @property
     def state(self) -> State:
@@ -73,8 +73,8 @@ class LyingLedger(Ledger):
 
 
 @contextlib.asynccontextmanager
-async def telling(me: Identity, other: Member, teller: Teller) -> AsyncIterator[PeerNode]:
-    """A peer of a mesh that is none itself."""
+async def bare_peer(me: Identity, other: Member, teller: Teller) -> AsyncIterator[PeerNode]:
+    """A peer of a mesh: a node alone, without the mesh's catalogues."""
     assert isinstance(other.fleet, Mesh)
     trust = Trust(paired={other.key: other.name})
     node = PeerNode(me, trust, teller, on_event=lambda _: None, epoch=teller.ledger.epoch)
@@ -99,7 +99,7 @@ async def meshed(me: Identity, *others: Identity) -> AsyncIterator[Member]:
 async def test_wrong_catalogue_has_its_host_cut() -> None:
     """A host that was let in, and lies about the digest of what it tells."""
     base, liar = identity("base"), identity("liar")
-    async with meshed(base, liar) as here, telling(liar, here, Teller(LyingLedger(7))):
+    async with meshed(base, liar) as here, bare_peer(liar, here, Teller(LyingLedger(7))):
         assert (await here.told(PeerLost)).reason is Loss.VIOLATED
         assert not [event for event in here.events if isinstance(event, PeerChanged)]
         refused = [event for event in here.events if isinstance(event, Refusal)]
@@ -113,14 +113,14 @@ async def test_wrong_catalogue_has_its_host_cut() -> None:
 )
 async def test_odd_question_for_a_catalogue_is_refused(args: Body) -> None:
     base, rover = identity("base"), identity("rover")
-    async with meshed(base, rover) as here, telling(rover, here, Teller()) as node:
+    async with meshed(base, rover) as here, bare_peer(rover, here, Teller()) as node:
         await here.sees(PeerKey(node.identity.key), {})
         with pytest.raises(CallFailed) as failed:
             await node.call(here.key, READ, args, deadline_s=60.0)
         assert failed.value.code == "PACKET_FIELDS"
 
 
-async def test_peers_that_never_answer_keep_nobody_waiting(
+async def test_peers_that_never_answer_do_not_delay_other_peers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(catalogues, "READ_S", 3600.0)
@@ -129,7 +129,7 @@ async def test_peers_that_never_answer_keep_nobody_waiting(
     async with meshed(base, rover, *mutes) as here, contextlib.AsyncExitStack() as stack:
         tellers = [Teller(is_mute=True) for _ in mutes]
         for me, teller in zip(mutes, tellers, strict=True):
-            await stack.enter_async_context(telling(me, here, teller))
+            await stack.enter_async_context(bare_peer(me, here, teller))
         await asyncio.gather(*(teller.asked.wait() for teller in tellers))
         there = await stack.enter_async_context(meshed(rover, base))
         there.fleet.publish(CAMERA)
@@ -139,7 +139,7 @@ async def test_peers_that_never_answer_keep_nobody_waiting(
 
 
 async def told_at_last(node: PeerNode, peer: PeerKey, change: Body) -> None:
-    """Tell a change as soon as there is room for it."""
+    """Tell a change as soon as the link can take it."""
     while True:
         try:
             return node.notify(peer, CHANGED, change)
@@ -154,7 +154,7 @@ async def test_changes_beyond_all_measure_are_read_when_there_is_time(
     monkeypatch.setattr(catalogues, "CHANGES_PER_S", 10.0)
     base, rover = identity("base"), identity("rover")
     teller = Teller()
-    async with meshed(base, rover) as here, telling(rover, here, teller) as node:
+    async with meshed(base, rover) as here, bare_peer(rover, here, teller) as node:
         await here.sees(rover_key := PeerKey(node.identity.key), {})
         for number in range(500):
             told = teller.ledger.state.revision

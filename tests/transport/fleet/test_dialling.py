@@ -1,4 +1,4 @@
-"""Who dials whom: real nodes, and hints that may be wrong, late, or gone."""
+"""Which hosts dial which: real nodes, and hints that may be wrong, late, or gone."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ async def test_peers_hear_of_a_departure_before_the_finder_has_ended() -> None:
     async with started(hosts[1], trust) as (base, told):
         mesh.meet(base.key, base.addresses)
         await told.told(PeerUp)
-        await rover.told(PeerUp)  # before, it knows nobody to say goodbye to
+        await rover.told(PeerUp)  # before, it has no peer to say goodbye to
         closing = asyncio.create_task(mesh.close())
         assert (await told.told(PeerLost)).reason is Loss.DEPARTED
         finder.may_close.set()
@@ -217,7 +217,7 @@ async def test_hosts_without_keys_meet_on_this_machine() -> None:
 
 
 class Dialled:
-    """Notes what a policy wants, where reaching so many hosts is beside the point."""
+    """Notes what a policy wants, for tests with more hosts than can be reached."""
 
     def __init__(self) -> None:
         self.dials: dict[PeerKey, tuple[str, ...]] = {}
@@ -243,8 +243,8 @@ async def test_strangers_hints_are_bounded() -> None:
     meeting.close()
 
 
-async def test_nobody_is_dialled_once_it_is_closed() -> None:
-    """A finder may hint at hosts until it has ended, too."""
+async def test_a_closed_policy_dials_no_host() -> None:
+    """A finder may give hints until it has ended, too."""
     dialled = Dialled()
     meeting = DialPolicy(PeerKey("a"), dialled, lambda key: True)
     meeting.close()

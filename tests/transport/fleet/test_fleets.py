@@ -58,7 +58,7 @@ async def test_changes_and_removals_follow(world: World) -> None:
 
 
 async def test_long_catalogue_comes_at_once(world: World) -> None:
-    """Several messages, one event: nobody sees half of it."""
+    """Several messages, one event: no subscriber sees half of it."""
     async with world.member("rover") as rover:
         rover.fleet.publish(LONG)
         async with world.member("base") as base:
@@ -99,7 +99,7 @@ async def test_departure_takes_the_catalogue_along(world: World) -> None:
         assert rover.key not in base.fleet.peers
 
 
-async def test_restarted_host_is_read_anew(world: World) -> None:
+async def test_catalogue_of_a_restarted_host_is_read_again(world: World) -> None:
     keys = HostKeys.generate()
     async with world.member("base") as base:
         async with world.member("rover", keys) as before:
@@ -174,7 +174,7 @@ async def test_call_of_a_lost_caller_follows_its_lease(
         assert await asyncio.wait_for(rover.servant.ended.get(), PATIENCE_S) == outcome
 
 
-async def test_notices_arrive_and_nobody_else_hears_the_seams_own(world: World) -> None:
+async def test_notices_reach_the_handler_except_those_of_the_fleet_itself(world: World) -> None:
     async with world.member("rover") as rover, world.member("base") as base:
         await base.told(PeerUp)
         base.fleet.notify(rover.key, "fleet.nothing", {})

@@ -60,8 +60,8 @@ class Told(RuleBasedStateMachine):
             self.on_the_way.extend(self.ledger.delta(before) or ())
 
     @rule()
-    def the_host_starts_anew(self) -> None:
-        """Its peers hear so before anything of the new life; what was on its way still is."""
+    def the_host_restarts(self) -> None:
+        """Peers learn of it before a message of the new run; older ones are still on their way."""
         self.epoch += 1
         self.ledger = Ledger(self.epoch, REMEMBERED)
         self.model = {}
@@ -96,8 +96,8 @@ class Told(RuleBasedStateMachine):
         self.on_the_way.pop(data.draw(st.integers(0, len(self.on_the_way) - 1)))
 
     @rule()
-    def it_becomes_quiet(self) -> None:
-        """A ping, and what is asked for then, arrive: no more is needed, ever."""
+    def changes_stop(self) -> None:
+        """A ping arrives, then the answer to what is asked for: no more is ever needed."""
         self.replica.hear(self.ledger.state)
         if self.replica.must_ask:
             for chunk in self.ledger.read(self.replica.epoch, self.replica.since):

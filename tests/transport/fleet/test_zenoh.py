@@ -82,7 +82,7 @@ async def test_host_without_trust_is_turned_away(world: ZenohWorld) -> None:
             started(world, "two", other, both) as two,
         ):
             if trusted.public < other.public:
-                continue  # who trusts nobody greets nobody
+                continue  # a host that trusts no key greets no host
             await one.until(lambda: bool(refusals(one)))
             assert refusals(one)[0].reason is Reason.UNKNOWN_KEY
             assert (await two.told(DialFailed)).problem.code == "KEY_UNKNOWN"
@@ -102,7 +102,7 @@ async def test_second_host_of_a_name_is_kept_out(world: ZenohWorld) -> None:
             assert set(rover.fleet.peers) == {first.key}
 
 
-async def test_peer_whose_key_is_revoked_is_cut(world: ZenohWorld) -> None:
+async def test_peer_with_a_revoked_key_is_cut(world: ZenohWorld) -> None:
     async with world.member("rover") as rover, world.member("base") as base:
         await base.told(PeerUp)
         fleet = world.members[1]

@@ -154,7 +154,7 @@ async def test_requests_fail_when_the_worker_goes(pair: tuple[WorkerLink, Ends])
     ("packet", "code"),
     [
         pytest.param(b"\xc1 garbage", "PACKET_MALFORMED", id="garbage"),
-        pytest.param(encode(Reply(5, {})), "UNKNOWN_CALL", id="answer to nobody"),
+        pytest.param(encode(Reply(5, {})), "UNKNOWN_CALL", id="answer to no call"),
         pytest.param(encode(Request(5, "mount", {})), "REQUEST_UNASKED", id="request"),
     ],
 )
@@ -181,7 +181,9 @@ async def flood(ends: Ends, packet: bytes) -> None:
 
 
 @pytest.mark.anyio
-async def test_steady_events_pass_and_a_flood_does_not(pair: tuple[WorkerLink, Ends]) -> None:
+async def test_events_within_the_rate_limit_pass_and_a_flood_does_not(
+    pair: tuple[WorkerLink, Ends],
+) -> None:
     _, ends = pair
     packet = encode(Event("heartbeat", None, {}))
     loop = asyncio.get_running_loop()

@@ -16,7 +16,7 @@ from nondum.transport.peers.messages import Hello, encode
 def bad_dealer(
     address: str, me: Identity, there: Host, *, most_read: int = 1000
 ) -> Iterator[zmq.Socket[bytes]]:
-    """A host that dials, and may say everything; so many messages are read that nobody asks for."""
+    """A host that dials, and may send anything; it reads `most_read` messages unasked."""
     with bad_socket(zmq.DEALER, me) as bad:
         bad.rcvhwm = most_read
         bad.curve_serverkey = there.key.encode("ascii")

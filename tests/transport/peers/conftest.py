@@ -8,5 +8,5 @@ from tests.transport.peers import hosts
 
 @pytest.fixture(params=hosts.KINDS)
 def each_kind_of_sockets(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The test is run for sockets in the daemon's process, and for those in one of their own."""
+    """Run the test for sockets in the daemon's process, and for sockets in a separate process."""
     monkeypatch.setattr(hosts, "SOCKETS", hosts.KINDS[request.param])

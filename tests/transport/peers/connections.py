@@ -15,7 +15,7 @@ class Accepted:
 
     def __init__(self, port: int) -> None:
         self._port = port
-        assert self._others(), f"no connection to port {port}"
+        assert self._other_ends(), f"no connection to port {port}"
 
     def until_closed(self) -> None:
         """Wait until ZeroMQ's own thread has closed them all; nothing else runs meanwhile.
@@ -25,13 +25,13 @@ class Accepted:
         looks: list[bool] = []
 
         def are_closed() -> bool:
-            looks.append(not self._others())
+            looks.append(not self._other_ends())
             return looks[-2:] == [True, True]
 
         until(f"the connections to port {self._port} are closed", are_closed)
 
-    def _others(self) -> list[str]:
-        """Their other ends: proc_net_tcp(5)."""
+    def _other_ends(self) -> list[str]:
+        """The other ends of the connections: proc_net_tcp(5)."""
         lines = (line for table in _TABLES for line in table.read_text().splitlines()[1:])
         return [
             there

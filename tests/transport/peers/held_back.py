@@ -9,8 +9,10 @@ from collections.abc import AsyncIterator
 
 @contextlib.asynccontextmanager
 async def held_back(address: str, *, to_it: int, from_it: int) -> AsyncIterator[str]:
-    """Where to connect to in place of `address`: only so many bytes pass, then nothing does, and
-    the connections stay."""
+    """An address to connect to in place of `address`.
+
+    `to_it` and `from_it` bytes pass; after that nothing does, and the connections stay.
+    """
     where, _, port = address.removeprefix("tcp://").rpartition(":")
     tasks: set[asyncio.Task[None]] = set()
 

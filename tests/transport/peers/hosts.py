@@ -1,4 +1,4 @@
-"""Hosts for the tests: real nodes on loopback, in this process or in one of their own.
+"""Hosts for the tests: real nodes on loopback, in this process or in a separate one.
 
 python -m tests.transport.peers.hosts CONFIG        # serves until it is killed
 """
@@ -81,7 +81,7 @@ class Servant:
                 return {"text": "x" * 1_000_000}
             case "break":
                 raise ValueError("broken")
-        raise CallFailed(Problem("NO_METHOD", f"nobody serves {incoming.method}"))
+        raise CallFailed(Problem("NO_METHOD", f"no handler serves {incoming.method}"))
 
     async def wait(self, incoming: IncomingCall) -> Body:
         self.running.put_nowait(incoming)
@@ -137,7 +137,7 @@ class Host:
                 self.refused.set()
 
     async def counted(self, reason: Reason, times: int = 1) -> None:
-        """Wait until so many were turned away for a reason."""
+        """Wait until `times` connections were turned away for a reason."""
         async with asyncio.timeout(PATIENCE_S):
             while self.node.refusals.counts.get(reason, 0) < times:
                 self.refused.clear()
@@ -200,7 +200,7 @@ async def up(one: Host, other: Host) -> None:
 
 @dataclass
 class Child:
-    """A host in a process of its own."""
+    """A host in a separate process."""
 
     process: subprocess.Popen[str]
     key: PeerKey

@@ -23,7 +23,7 @@ OPENED = "opened"
 
 
 class Listens(Protocol):
-    """Begins to listen with so many descriptors left, and ends; what became of it."""
+    """Listens with `left` descriptors left, and ends; tells the outcome."""
 
     async def __call__(self, left: int) -> str: ...
 
@@ -43,7 +43,7 @@ async def pairing(left: int) -> str:
 
 async def links(left: int) -> str:
     """The sockets of a host's links."""
-    owner = Owner(_nobody_comes, lambda _: None, lambda _: None, lambda: 0.0)
+    owner = Owner(_unexpected_connection, lambda _: None, lambda _: None, lambda: 0.0)
     with descriptors_left(left):
         sockets = LocalSockets(identity("rover"), Trust(), owner)
         try:
@@ -58,8 +58,8 @@ async def links(left: int) -> str:
 KINDS: Mapping[str, Listens] = {"pairing": pairing, "links": links}
 
 
-def _nobody_comes(*_: object) -> NoReturn:
-    raise AssertionError("nobody knows the address")
+def _unexpected_connection(*_: object) -> NoReturn:
+    raise AssertionError("no test connects to this address")
 
 
 async def _main(listens: Listens, lefts: Sequence[str]) -> None:

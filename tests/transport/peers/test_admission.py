@@ -1,4 +1,4 @@
-"""Who is let in, who is turned away, and that neither garbage nor strangers hurt the others."""
+"""Which hosts are let in or turned away, and that garbage and strangers harm no other link."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ async def test_host_without_keys_is_turned_away() -> None:
     [b"GET / HTTP/1.1\r\n\r\n" * 20, b"\xff" * 400, b"\0" * 400, os.urandom(4096)],
     ids=["HTTP", "ones", "noughts", "random"],
 )
-async def test_garbage_speaker_is_dropped_and_hurts_nobody(noise: bytes) -> None:
+async def test_sender_of_garbage_is_dropped_and_other_links_work(noise: bytes) -> None:
     async with two_hosts() as (rover, base):
         with tcp(base) as speaker:
             speaker.sendall(noise)
@@ -284,7 +284,7 @@ async def test_longer_message_than_allowed_cuts_the_sender_alone() -> None:
         assert await good.node.call(there.key, "echo", {}, deadline_s=5) == {}
 
 
-async def test_version_that_nobody_speaks_is_told() -> None:
+async def test_unsupported_version_is_reported() -> None:
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there:
         with raw_dealer(there, rover) as future:
@@ -328,8 +328,8 @@ async def test_judge_that_fails_turns_away_and_goes_on(caplog: pytest.LogCapture
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     asked: list[ConnectionAttempt] = []
 
-    def judge(knock: ConnectionAttempt) -> Entry:
-        asked.append(knock)
+    def judge(attempt: ConnectionAttempt) -> Entry:
+        asked.append(attempt)
         raise RuntimeError("no judge today")
 
     handler = ZapHandler(context, judge)

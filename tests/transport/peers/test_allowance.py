@@ -64,7 +64,7 @@ async def test_length_counts(narrow: tuple[Host, Host]) -> None:
     assert (await base.told(PeerLost)).reason is Loss.VIOLATED
 
 
-async def test_whoever_waits_for_answers_is_not_cut(narrow: tuple[Host, Host]) -> None:
+async def test_peer_that_waits_for_answers_is_not_cut(narrow: tuple[Host, Host]) -> None:
     rover, base = narrow
     for number in range(4):
         calls = [rover.node.call(base.key, "echo", {"n": n}, deadline_s=60) for n in range(50)]
@@ -137,7 +137,7 @@ async def test_answers_are_free(narrow: tuple[Host, Host]) -> None:
     assert base.node.refusals.counts == {}
 
 
-async def test_answers_that_nobody_waits_for_are_not_free(narrow: tuple[Host, Host]) -> None:
+async def test_answers_to_no_call_count_against_the_allowance(narrow: tuple[Host, Host]) -> None:
     rover, base = narrow
     session = rover.node._peer_table.session(base.key)
     for number in range(1, 251):

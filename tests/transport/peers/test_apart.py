@@ -1,4 +1,4 @@
-"""Links in a process of their own: it may end, hang, or be no such process; the daemon stays."""
+"""Links in a separate process: it may end, hang, or be another program; the daemon stays."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ KEY = HostKeys.generate().public
 TEXT = "x" * 100_000
 LONG = encode(Notice("values", {"text": TEXT}))
 CROWD = MOST_WAITING // len(LONG) + 10
-"""Such messages that may wait for the other process; so many more lie in the kernel's buffers."""
+"""Such messages that may wait for the other process, and some in the kernel's buffers."""
 KERNELS = 160
-"""Such messages that lie in the buffers of a TCP connection (tcp(7)), and room."""
+"""Such messages that lie in the buffers of a TCP connection (tcp(7)), and a margin."""
 LITTLE_BYTES = 56 * 1024**2
 """Enough to begin with, and too little for the messages that ZeroMQ lets wait."""
 
@@ -101,7 +101,7 @@ async def test_process_is_started_again_once_there_are_descriptors(clock: Virtua
         await clock.advance_until(started)
 
 
-async def test_links_that_come_back_at_once_lose_nobody_and_no_call() -> None:
+async def test_links_that_come_back_at_once_lose_no_peer_and_no_call() -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "wait", {"tag": "once"}, deadline_s=PATIENCE_S)
         await base.servant.running.get()
@@ -117,7 +117,7 @@ async def test_links_that_come_back_at_once_lose_nobody_and_no_call() -> None:
 async def test_process_over_its_memory_limit_ends_and_the_daemon_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The daemon stands still, so that nobody takes in what comes."""
+    """The daemon stands still, so that no process takes in what comes."""
     start = functools.partial(LinksProcess, memory=LITTLE_BYTES)
     monkeypatch.setattr(hosts, "SOCKETS", functools.partial(SocketProcess, start=start))
     base, rover = identity("base"), identity("rover")
@@ -138,7 +138,7 @@ async def test_process_over_its_memory_limit_ends_and_the_daemon_does_not(
 async def test_process_reads_no_more_than_a_daemon_that_stands_still_can_take(
     clock: VirtualClock,
 ) -> None:
-    """Whose time stands still as well, so that it does not take its peer for lost."""
+    """The daemon's time stands still as well, so that it does not take its peer for lost."""
     base, rover = identity("base"), identity("rover")
     async with host(base, trusting(rover)) as there:
         with bad_dealer(there.address, rover, there) as bad:
@@ -336,7 +336,7 @@ async def test_process_that_does_not_start_is_told(
                 pass
 
 
-async def test_process_whose_pipe_cannot_be_watched_is_told_and_ended(
+async def test_process_with_an_unwatchable_pipe_is_reported_and_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     started: list[int] = []
@@ -365,8 +365,8 @@ STRANGE: Mapping[str, list[Any]] = {
     "unknown refusal": ["refused", "boredom", "", "", ""],
     "no problem": ["over", 2, {"message": "a problem without code"}],
     "no count": ["taken", 2],
-    "nobody listens": ["listening", ["tcp://127.0.0.1:1"]],
-    "nobody listened": ["unusable", [{"code": "CODE", "message": "nobody asked"}]],
+    "no one listens": ["listening", ["tcp://127.0.0.1:1"]],
+    "no one listened": ["unusable", [{"code": "CODE", "message": "no one asked"}]],
 }
 
 

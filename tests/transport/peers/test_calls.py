@@ -72,7 +72,7 @@ async def test_a_broken_handler_is_told_and_harms_nothing(caplog: pytest.LogCapt
 
 
 @pytest.mark.usefixtures("each_kind_of_sockets")
-async def test_progress_is_heard_before_the_answer() -> None:
+async def test_progress_arrives_before_the_answer() -> None:
     async with two_hosts() as (rover, base):
         call = rover.node.call(base.key, "count", {"to": 5}, deadline_s=5)
         assert [report["number"] async for report in call] == [0, 1, 2, 3, 4]
@@ -96,7 +96,7 @@ async def test_notice_arrives_unanswered() -> None:
 
 
 @pytest.mark.usefixtures("each_kind_of_sockets")
-async def test_cancelled_caller_cancels_the_errand() -> None:
+async def test_cancelled_caller_cancels_the_call() -> None:
     async with two_hosts() as (rover, base):
         task = asyncio.ensure_future(wait(rover, base))
         await base.servant.running.get()
@@ -157,7 +157,7 @@ async def test_caller_is_told_when_the_peer_takes_no_more() -> None:
         assert await rover.node.call(base.key, "echo", {}, deadline_s=5) == {}
 
 
-async def test_nobody_can_call_a_stranger() -> None:
+async def test_call_to_a_host_without_a_link_is_refused() -> None:
     async with two_hosts() as (rover, _):
         with pytest.raises(PeerUnreachable, match="PEER_DOWN"):
             rover.node.call(identity("other").key, "echo", {}, deadline_s=5)
@@ -186,7 +186,7 @@ async def test_first_address_that_works_wins() -> None:
 async def test_address_that_cannot_be_dialled_is_told() -> None:
     rover, base = identity("rover"), identity("base")
     async with host(base, trusting(rover)) as there, host(rover, trusting(base)) as here:
-        here.node.dial(there.key, ["tcp://nobody:port", there.address])
+        here.node.dial(there.key, ["tcp://nowhere:port", there.address])
         assert (await here.told(DialFailed)).problem.code == "ADDRESS_MALFORMED"
         await up(here, there)
 

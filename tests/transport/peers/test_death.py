@@ -29,7 +29,7 @@ pytestmark = pytest.mark.anyio
 
 @pytest.fixture
 async def pair() -> AsyncIterator[tuple[Host, Child]]:
-    """A host here, linked to one in a process of its own."""
+    """A host here, linked to one in a separate process."""
     keys, me = HostKeys.generate(), identity("rover")
     with child(keys, [me]) as other:
         async with host(me, trusting(identity("child", keys))) as here:
@@ -126,7 +126,7 @@ async def test_call_of_a_lost_caller_follows_its_lease(lease: Lease, outcome: st
 
 
 @pytest.mark.parametrize("lease", [Lease.FINISH, Lease.HOLD], ids=lambda value: str(value))
-async def test_only_a_held_errand_outlives_its_deadline(lease: Lease, clock: VirtualClock) -> None:
+async def test_only_a_held_call_outlives_its_deadline(lease: Lease, clock: VirtualClock) -> None:
     rover, base = identity("rover"), identity("base")
     async with host(base, trusting(rover)) as there:
         there.servant.lease = lease

@@ -40,16 +40,16 @@ class Nowhere:
     """The receiver of a connection that is none."""
 
     def connected(self) -> None:
-        raise AssertionError("there is nobody")
+        raise AssertionError("there is no connection")
 
     def received(self, data: bytes) -> None:
-        raise AssertionError("there is nobody")
+        raise AssertionError("there is no connection")
 
     def misused(self, reason: Reason) -> None:
-        raise AssertionError("there is nobody")
+        raise AssertionError("there is no connection")
 
     def doubtful(self) -> None:
-        raise AssertionError("there is nobody")
+        raise AssertionError("there is no connection")
 
     def over(self, problem: Problem | None) -> None:
         raise AssertionError("it never began")
@@ -113,14 +113,16 @@ async def test_watch_without_descriptors_leaves_nothing_open(context: Context, l
 
 
 @pytest.mark.parametrize("left", range(4))
-async def test_door_without_descriptors_leaves_nothing_open(context: Context, left: int) -> None:
+async def test_pairing_listener_without_descriptors_leaves_nothing_open(
+    context: Context, left: int
+) -> None:
     refusals = Refusals(lambda _: None)
     with descriptors_left(left), pytest.raises(zmq.ZMQError, match="Too many open files"):
         PairingListener(context, KEYS, scarcity.ADDRESS, lambda *_: None, refusals)
 
 
 @pytest.mark.parametrize("left", range(3))
-async def test_door_that_the_loop_does_not_watch_leaves_nothing_open(
+async def test_pairing_listener_that_the_loop_does_not_watch_leaves_nothing_open(
     context: Context, left: int
 ) -> None:
     refusals = Refusals(lambda _: None)

@@ -36,12 +36,12 @@ FLEET, _ = new_fleet()
 
 
 def judged(
-    knock: ConnectionAttempt, trust: Trust = TRUST, keys: HostKeys | None = ME
+    attempt: ConnectionAttempt, trust: Trust = TRUST, keys: HostKeys | None = ME
 ) -> Reason | None:
-    return judge(knock, Identity("base", keys), trust)
+    return judge(attempt, Identity("base", keys), trust)
 
 
-def knock(
+def attempt(
     key: PeerKey | str, *, domain: bytes = DOMAIN, mechanism: str = "CURVE", at: str = "10.0.0.7"
 ) -> ConnectionAttempt:
     return ConnectionAttempt(at, domain, mechanism, key)
@@ -50,14 +50,14 @@ def knock(
 @pytest.mark.parametrize(
     ("asked", "reason"),
     [
-        (knock(PAIRED.public), None),
-        (knock(PAIRED.public, domain=b"another"), Reason.WRONG_DOMAIN),
-        (knock(PAIRED.public, domain=b""), Reason.WRONG_DOMAIN),
-        (knock(PAIRED.public, mechanism="PLAIN"), Reason.MISMATCH),
-        (knock("", mechanism="NULL"), Reason.MISMATCH),
-        (knock(ME.public), Reason.DUPLICATE),
-        (knock(REVOKED.public), Reason.REVOKED),
-        (knock(OTHER.public), Reason.UNKNOWN_KEY),
+        (attempt(PAIRED.public), None),
+        (attempt(PAIRED.public, domain=b"another"), Reason.WRONG_DOMAIN),
+        (attempt(PAIRED.public, domain=b""), Reason.WRONG_DOMAIN),
+        (attempt(PAIRED.public, mechanism="PLAIN"), Reason.MISMATCH),
+        (attempt("", mechanism="NULL"), Reason.MISMATCH),
+        (attempt(ME.public), Reason.DUPLICATE),
+        (attempt(REVOKED.public), Reason.REVOKED),
+        (attempt(OTHER.public), Reason.UNKNOWN_KEY),
     ],
 )
 def test_handshake_is_judged_by_domain_mechanism_and_key(
@@ -67,21 +67,21 @@ def test_handshake_is_judged_by_domain_mechanism_and_key(
 
 
 def test_own_key_is_turned_away_even_if_it_is_paired() -> None:
-    assert judged(knock(ME.public), Trust(paired={ME.public: "base"})) is Reason.DUPLICATE
+    assert judged(attempt(ME.public), Trust(paired={ME.public: "base"})) is Reason.DUPLICATE
 
 
 def test_unknown_key_may_greet_a_host_of_a_fleet() -> None:
-    assert judged(knock(OTHER.public), TRUST.with_fleet(FLEET, "survey")) is None
-    assert judged(knock(REVOKED.public), TRUST.with_fleet(FLEET, "survey")) is Reason.REVOKED
+    assert judged(attempt(OTHER.public), TRUST.with_fleet(FLEET, "survey")) is None
+    assert judged(attempt(REVOKED.public), TRUST.with_fleet(FLEET, "survey")) is Reason.REVOKED
 
 
 @pytest.mark.parametrize(
     ("asked", "reason"),
     [
-        (knock("", mechanism="NULL", at="127.0.0.1"), None),
-        (knock("", mechanism="NULL", at="10.0.0.7"), Reason.MISMATCH),
-        (knock(PAIRED.public, at="127.0.0.1"), Reason.MISMATCH),
-        (knock("", mechanism="NULL", at="127.0.0.1", domain=b""), Reason.WRONG_DOMAIN),
+        (attempt("", mechanism="NULL", at="127.0.0.1"), None),
+        (attempt("", mechanism="NULL", at="10.0.0.7"), Reason.MISMATCH),
+        (attempt(PAIRED.public, at="127.0.0.1"), Reason.MISMATCH),
+        (attempt("", mechanism="NULL", at="127.0.0.1", domain=b""), Reason.WRONG_DOMAIN),
     ],
 )
 def test_host_without_keys_is_met_on_this_machine_only(

@@ -69,7 +69,7 @@ def test_no_public_key_looks_like_an_option_on_a_command_line() -> None:
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o660])
-def test_key_that_others_can_read_is_refused(tmp_path: Path, mode: int) -> None:
+def test_key_file_readable_by_other_users_is_refused(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "host.key"
     load_or_create(path)
     path.chmod(mode)
@@ -243,7 +243,7 @@ def test_certificate_that_ends_before_it_begins_is_refused() -> None:
 
 
 def test_name_in_a_certificate_that_is_no_hosts_is_refused() -> None:
-    """Whoever signed it."""
+    """Even if the fleet has signed it."""
     for odd, code in (
         (replace(issued(), host="Rover"), "HOST_NAME"),
         (replace(issued(), not_after=NOW - timedelta(days=2)), "CERTIFICATE_VALIDITY"),
@@ -259,16 +259,16 @@ def test_fleet_key_that_is_none_has_signed_nothing(fleet: str) -> None:
         verify(odd, {FleetKey(fleet)}, NOW)
 
 
-def test_certificate_of_another_key_lets_nobody_in() -> None:
+def test_certificate_of_another_key_is_refused() -> None:
     trust = Trust().with_fleet(FLEET, "survey")
     assert trust.admit(KEYS.public, issued().to_bytes(), NOW).name == "rover-1"
     with pytest.raises(PeerRefused, match="CERTIFICATE_KEY"):
         trust.admit(OTHERS.public, issued().to_bytes(), NOW)
     with pytest.raises(PeerRefused, match="CERTIFICATE_TIME"):
         trust.admit(KEYS.public, issued().to_bytes(), NOW + timedelta(days=60))
-    for nobody in (trust, Trust()):
+    for either in (trust, Trust()):
         with pytest.raises(PeerRefused, match="KEY_UNKNOWN"):
-            nobody.admit(KEYS.public, b"", NOW)
+            either.admit(KEYS.public, b"", NOW)
     with pytest.raises(PeerRefused, match="KEY_UNKNOWN"):
         Trust().admit(KEYS.public, issued().to_bytes(), NOW)
 
@@ -276,7 +276,7 @@ def test_certificate_of_another_key_lets_nobody_in() -> None:
 def test_revoked_key_is_out_however_it_came_in() -> None:
     trust = Trust().with_fleet(FLEET, "survey").with_paired(KEYS.public, "rover")
     revoked = trust.with_revoked(KEYS.public, "stolen")
-    assert revoked.standing(KEYS.public) is TrustState.REVOKED
+    assert revoked.state_of(KEYS.public) is TrustState.REVOKED
     with pytest.raises(PeerRefused, match="stolen"):
         revoked.admit(KEYS.public, issued().to_bytes(), NOW)
     with pytest.raises(PeerRefused, match="KEY_REVOKED"):
@@ -297,7 +297,7 @@ def test_trust_survives_its_file(tmp_path: Path) -> None:
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
-def test_trust_that_others_may_change_is_refused(tmp_path: Path) -> None:
+def test_trust_file_writable_by_other_users_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "trust.json"
     trust_file.save(path, Trust())
     path.chmod(0o666)

@@ -1,4 +1,4 @@
-"""Pairing by a code that two people compare, and somebody in the middle."""
+"""Pairing by a code that two people compare, and an attacker between them."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_nonce_of_another_length_is_refused() -> None:
         receive(answering, Nonce(b"a" * (NONCE_BYTES - 1)), ROVER, 1.0)
 
 
-def test_own_key_is_no_others() -> None:
+def test_own_key_is_refused_from_another_host() -> None:
     answering = begin(Role.ANSWERING, BASE, b"n" * NONCE_BYTES)
     with pytest.raises(PeerRefused, match="PAIRING_KEY"):
         receive(answering, Ask(BASE, "rover"), BASE, 1.0)
@@ -196,7 +196,7 @@ def test_nothing_is_taken_after_a_person_said_no() -> None:
 
 
 class Disorder(RuleBasedStateMachine):
-    """Whatever comes, in whatever order: nobody is paired without both people's yes."""
+    """Whatever comes, in whatever order: no host is paired without both people's yes."""
 
     def __init__(self) -> None:
         super().__init__()

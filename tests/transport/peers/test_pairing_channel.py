@@ -1,4 +1,4 @@
-"""Pairing over the network: two hosts, their people, and whoever comes between."""
+"""Pairing over the network: two hosts, their people, and attackers between them."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class End:
     async def sees(
         self, kind: type[S], holds: Callable[[S], bool] = lambda state: True, since: int = 0
     ) -> S:
-        """Wait until the host is, or was, in a state since so many were told."""
+        """Wait until the host is, or was, in a state; the first `since` states do not count."""
         async with asyncio.timeout(PATIENCE_S):
             while True:
                 for state in self.states[since:]:
@@ -109,7 +109,7 @@ class End:
         )
 
     async def turns_away(self, *reasons: Reason) -> None:
-        """Wait until somebody was turned away for one of these reasons."""
+        """Wait until a host was turned away for one of these reasons."""
         async with asyncio.timeout(PATIENCE_S):
             while (await self.refused.get()).reason not in reasons:
                 pass
@@ -161,7 +161,7 @@ async def compared(rover: End, base: End) -> tuple[Comparing, Comparing]:
 
 
 class Stranger:
-    """Speaks to a window as it likes, with a key of its own."""
+    """Sends anything to a host that waits for pairing, with a new key."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], to: End) -> None:
         self.keys = HostKeys.generate()
@@ -203,7 +203,7 @@ def stranger_to() -> Iterator[Callable[[End], Stranger]]:
     context.term()
 
 
-async def test_hosts_whose_people_see_one_code_agree() -> None:
+async def test_hosts_that_show_the_same_code_agree() -> None:
     async with end("rover") as rover, end("base") as base:
         here, there = await compared(rover, base)
         assert here.code == there.code
@@ -278,7 +278,7 @@ async def test_nothing_is_confirmed_before_there_is_a_code() -> None:
             rover.host.confirm("123 456")
 
 
-async def test_somebody_in_the_middle_is_seen_by_the_codes() -> None:
+async def test_attacker_between_the_hosts_is_seen_by_the_codes() -> None:
     """Mallory answers the rover as the base, and asks the base as the rover."""
     mallory = HostKeys.generate()
     as_base, as_rover = Identity("base", mallory), Identity("rover", mallory)
@@ -347,7 +347,7 @@ async def test_window_closes_by_itself(
 @pytest.mark.parametrize(
     ("who_says_yes", "here", "there"),
     [
-        ("nobody", "here or at base", "here or at rover"),
+        ("no_one", "here or at base", "here or at rover"),
         ("here", "no one at base", "and no one at this host"),
     ],
 )
@@ -401,7 +401,7 @@ async def test_yes_holds_for_a_later_try_with_the_same_host() -> None:
 async def test_window_that_the_other_host_closed_first_is_what_the_end_tells(
     clock: VirtualClock,
 ) -> None:
-    """Who dials a host whose window is closed finds that nobody answers there: that is no news."""
+    """A host that dials another one after its window closed gets no answer: that is no news."""
     async with end("rover") as rover:
         async with end("base") as base:
             rover.asks(base)
@@ -459,7 +459,7 @@ async def test_host_that_is_known_may_be_paired_again() -> None:
         assert here.code == there.code
 
 
-async def test_end_of_the_window_tells_why_nobody_was_reached(clock: VirtualClock) -> None:
+async def test_end_of_the_window_tells_why_no_host_was_reached(clock: VirtualClock) -> None:
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with end("rover") as rover:
@@ -526,7 +526,7 @@ async def test_answering_host_that_vanishes_is_asked_again() -> None:
             assert (await base.sees(Comparing)).code == second.code
 
 
-async def test_silent_asker_makes_room(
+async def test_silent_asker_gives_way_to_the_next(
     monkeypatch: pytest.MonkeyPatch, stranger_to: Callable[[End], Stranger]
 ) -> None:
     monkeypatch.setattr(channel, "ANSWER_S", 0.3)
@@ -581,7 +581,7 @@ async def test_answer_of_a_host_that_is_not_wanted_is_refused() -> None:
     ],
     ids=["empty", "no msgpack", "long", "parts", "out of turn", "ended", "beat"],
 )
-async def test_garbage_of_strangers_is_counted_and_hurts_nobody(
+async def test_garbage_of_strangers_is_counted_and_the_pairing_goes_on(
     parts: tuple[bytes | Said, ...], stranger_to: Callable[[End], Stranger]
 ) -> None:
     async with end("base") as base, end("rover") as rover:
@@ -646,7 +646,7 @@ async def test_host_without_keys_cannot_ask() -> None:
     async with end("base") as base:
         context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         plain = dialling(context, None, None)
-        plain.connect(base.address)  # whoever sees first that they do not match may be either
+        plain.connect(base.address)  # either end may be the first to see the mismatch
         await base.turns_away(Reason.MISMATCH, Reason.GARBAGE)
         plain.close(0)
         context.term()
@@ -684,7 +684,7 @@ THINGS_SAID = st.one_of(
 
 @a_share(5)
 @given(st.lists(st.lists(THINGS_SAID, max_size=6), max_size=3), st.booleans())
-async def test_whatever_strangers_say_nobody_is_paired_with_them(
+async def test_strangers_are_never_paired_whatever_they_send(
     talks: list[list[bytes | Said]], is_own_key: bool
 ) -> None:
     """And the next host is still answered, unless the tries are used up."""

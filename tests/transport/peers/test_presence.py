@@ -34,7 +34,7 @@ BEAT_S = 0.3
 STEP_S = 0.05
 
 
-async def test_host_whose_loop_stood_still_gives_no_peer_up(clock: VirtualClock) -> None:
+async def test_host_after_a_stall_of_its_loop_gives_no_peer_up(clock: VirtualClock) -> None:
     async with two_hosts() as (rover, base):
         await clock.advance(1.0)
         for stall_s in (1.0, 5.0, 3600.0):
@@ -140,7 +140,9 @@ class Wire:
         """End the connection."""
 
 
-async def test_late_peer_that_others_hear_has_the_same_time_once_more(clock: VirtualClock) -> None:
+async def test_late_peer_that_another_peer_reaches_has_the_same_time_once_more(
+    clock: VirtualClock,
+) -> None:
     async with three_hosts() as (fleet, cables):
         cables.rover_base.break_silently()
         alone_s, helped_s = TERMS.limit_s(BEAT_S), TERMS.confirm_s(BEAT_S)
@@ -148,7 +150,7 @@ async def test_late_peer_that_others_hear_has_the_same_time_once_more(clock: Vir
         assert alone_s + helped_s - BEAT_S - STEP_S <= found_s <= alone_s + helped_s + STEP_S
 
 
-async def test_late_peer_that_is_heard_again_is_not_given_up(clock: VirtualClock) -> None:
+async def test_late_peer_that_sends_again_is_not_given_up(clock: VirtualClock) -> None:
     async with three_hosts() as (fleet, cables):
         cables.rover_base.break_silently()
         for _ in range(24):
@@ -237,7 +239,7 @@ class Fleet:
 
     @property
     def ring(self) -> tuple[tuple[Host, Host], ...]:
-        """Who tells whom: what is asked on this way is answered before it ends."""
+        """Sender and receiver, in order: a question on this way is answered before the way ends."""
         return (
             (self.rover, self.scout),
             (self.scout, self.base),

@@ -19,7 +19,7 @@ from nondum.transport.peers.zap import DOMAIN, ENDPOINT, Entry, ZapHandler
 pytestmark = pytest.mark.anyio
 
 SOON_MS = 50
-"""When ZeroMQ gives up a handshake that nobody judges, where a test waits for that."""
+"""When ZeroMQ gives up a handshake without a verdict, where a test waits for that."""
 
 
 class ConnectionFilter:
@@ -87,7 +87,9 @@ async def test_socket_that_lets_strangers_in_is_never_bound(fault: str) -> None:
     context.term()
 
 
-async def test_socket_for_which_nobody_answers_is_never_bound(clock: VirtualClock) -> None:
+async def test_socket_without_an_answer_from_the_handler_is_never_bound(
+    clock: VirtualClock,
+) -> None:
     async with proving() as host:
         assert DOMAIN in await host.connection_filter.asked.get()
         await clock.advance(ANSWERED_S - TICK_S)
@@ -108,7 +110,7 @@ async def test_time_in_which_the_own_loop_stands_still_is_none_to_answer_in(
         await host.proof
 
 
-async def test_probe_whose_connection_has_ended_unanswered_is_sent_anew(
+async def test_probe_is_sent_again_after_its_connection_ended_unanswered(
     clock: VirtualClock,
 ) -> None:
     """A host that stands still for longer than a handshake may take has done nothing wrong."""
@@ -119,7 +121,7 @@ async def test_probe_whose_connection_has_ended_unanswered_is_sent_anew(
         assert len(set(host.probes)) == 2
 
 
-async def test_probes_are_sent_anew_a_few_times_only(clock: VirtualClock) -> None:
+async def test_probes_are_sent_again_a_few_times_only(clock: VirtualClock) -> None:
     async with proving(handshake_ms=SOON_MS) as host:
         with pytest.raises(PeerRefused, match="ZAP_INEFFECTIVE"):
             await host.proof

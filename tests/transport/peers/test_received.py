@@ -1,5 +1,7 @@
-"""What came over a link and is no whole message is bounded, whoever dialled, and whatever is well
-meant is not taken for it."""
+"""Incomplete messages on a link are bounded, on accepted and dialled connections.
+
+Proper messages are never taken for incomplete ones.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,9 @@ LOOK_S = 0.01
 beats = st.sampled_from([0.0, 0.3, 0.6, 1.8, 5.4, 1e9])
 steps = st.floats(0.001, 3.0)
 words = st.lists(
-    st.one_of(st.tuples(st.just("look"), steps), st.tuples(st.sampled_from(["heard", "vouched"]))),
+    st.one_of(
+        st.tuples(st.just("look"), steps), st.tuples(st.sampled_from(["received", "vouched"]))
+    ),
     max_size=60,
 )
 
@@ -27,8 +29,8 @@ def test_peer_is_given_up_only_if_it_was_asked_and_silent_since(
     watched, now_s, heard_s, asked_s = Watched(0.0), 0.0, 0.0, None
     for what, *more in told:
         match what:
-            case "heard":
-                watched, heard_s, asked_s = watched.heard(now_s), now_s, None
+            case "received":
+                watched, heard_s, asked_s = watched.received(now_s), now_s, None
                 assert watched.look(now_s, TERMS, beat) == (watched, Verdict.HEARD)
             case "vouched":
                 watched = watched.vouched()
@@ -49,7 +51,7 @@ def test_peer_is_given_up_only_if_it_was_asked_and_silent_since(
 def test_peer_that_answers_in_time_when_it_is_asked_is_never_given_up(
     beat: float, lateness: list[float]
 ) -> None:
-    """Even if it never says anything of its own accord."""
+    """Even if it never sends anything unasked."""
     watched, now_s = Watched(0.0), 0.0
     for late in lateness:
         now_s = watched.due_s(TERMS, beat)
@@ -58,7 +60,7 @@ def test_peer_that_answers_in_time_when_it_is_asked_is_never_given_up(
         now_s += late * TERMS.confirm_s(beat)
         watched, verdict = watched.look(now_s, TERMS, beat)
         assert verdict is Verdict.WAIT
-        watched = watched.heard(now_s)
+        watched = watched.received(now_s)
 
 
 @given(beats, st.lists(st.integers(0, 2000), max_size=20))
@@ -85,7 +87,7 @@ def test_word_of_a_helper_counts_once_and_only_while_a_peer_is_suspected() -> No
     once = suspected.vouched()
     assert once.due_s(TERMS, 0.3) == pytest.approx(5.8 + 1.2)
     assert once.vouched() == once
-    assert once.heard(6.0) == Watched(6.0)
+    assert once.received(6.0) == Watched(6.0)
 
 
 @given(st.lists(st.floats(0.0, 1000.0), max_size=50))
@@ -99,7 +101,7 @@ def test_time_in_which_the_own_loop_stood_still_does_not_count(gaps: list[float]
         assert 0.0 <= awake.seconds - before <= min(gap, 0.45) + 1e-5
 
 
-def test_peer_heard_just_before_a_long_stall_is_not_suspected_after_it() -> None:
+def test_peer_that_sent_just_before_a_long_stall_is_not_suspected_after_it() -> None:
     awake = Awake(at_s=0.0, longest_s=0.45).look(0.3)
     watched = Watched(awake.seconds)
     awake = awake.look(3600.0)

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.anyio
 
 TEXT = "x" * 100_000
 KERNELS = (4 + 6 + 6) * 10
-"""Messages that lie in buffers of both kernels: tcp_wmem, tcp_rmem, and room (tcp(7))."""
+"""Messages that lie in buffers of both kernels: tcp_wmem, tcp_rmem, and a margin (tcp(7))."""
 TRIES = 3000
 
 

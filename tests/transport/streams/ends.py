@@ -35,10 +35,10 @@ class Granted:
         """As many frames leave before anything that the reader says after its claim is read."""
         self.over: asyncio.Future[Problem] = loop.create_future()
         self.outgoing: Outgoing = exporter.grant(
-            secrets.token_hex(16), reader.public, kind, self._on_room, self.over.set_result
+            secrets.token_hex(16), reader.public, kind, self._on_can_send, self.over.set_result
         )
 
-    def _on_room(self) -> None:
+    def _on_can_send(self) -> None:
         if not self.claimed.done():
             self.claimed.set_result(None)
             for _ in range(self.sends_at_once):
@@ -55,7 +55,7 @@ class Reading:
         loop = asyncio.get_running_loop()
         self.frames: list[Frame] = []
         self.untimed: list[Frame] = []
-        """Frames whose stamps nobody here can tell the meaning of."""
+        """Frames with time stamps that cannot be converted to this host's clock."""
         self.opened: asyncio.Future[str] = loop.create_future()
         self.over: asyncio.Future[Problem] = loop.create_future()
         self.handles = True
@@ -70,7 +70,7 @@ class Reading:
         )
 
     async def until(self, count: int) -> Frame:
-        """Wait for so many frames; the last of them."""
+        """Wait for `count` frames; the last of them."""
         async with asyncio.timeout(PATIENCE_S):
             while len(self.frames) < count:
                 self._news.clear()
@@ -131,8 +131,10 @@ class LyingOwner:
 
 @contextlib.asynccontextmanager
 async def stalling(port: int, *, to_port: int, to_client: int) -> AsyncIterator[int]:
-    """A way to a port of this machine on which only so many bytes get through each way, and the
-    rest is held back; its own port."""
+    """The port of a relay to a port of this machine.
+
+    It passes `to_port` and `to_client` bytes, and holds the rest back.
+    """
 
     async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, most: int) -> None:
         while most > 0 and (data := await reader.read(min(most, 65536))):

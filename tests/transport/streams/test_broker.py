@@ -1,4 +1,4 @@
-"""The broker hands each end one half of a connection, or neither keeps one."""
+"""The broker gives each end one half of a connection, or neither end keeps one."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def test_nothing_is_known_at_first() -> None:
 
 def test_one_clock_for_both_is_exact() -> None:
     clocks = Clocks()
-    clocks.heard(sent_s=10.0, owner_s=10.0004, now_s=10.001)
+    clocks.pong_received(sent_s=10.0, owner_s=10.0004, now_s=10.001)
     assert clocks.ahead_s == 0.0
 
 
@@ -28,7 +28,7 @@ def test_error_is_no_more_than_half_the_quickest_answer(
     clocks = Clocks()
     for number, (there_s, back_s) in enumerate(ways):
         sent_s = 50.0 + number
-        clocks.heard(sent_s, sent_s + there_s + ahead_s, sent_s + there_s + back_s)
+        clocks.pong_received(sent_s, sent_s + there_s + ahead_s, sent_s + there_s + back_s)
     quickest_s = min(there_s + back_s for there_s, back_s in ways)
     drift_s = 2e-4 * len(ways)
     assert clocks.ahead_s == pytest.approx(ahead_s, abs=quickest_s / 2 + drift_s + 1e-6)
@@ -36,6 +36,6 @@ def test_error_is_no_more_than_half_the_quickest_answer(
 
 def test_old_answers_give_way_as_clocks_drift() -> None:
     clocks = Clocks()
-    clocks.heard(0.0, 1000.0005, 0.001)
-    clocks.heard(100.0, 1100.026, 100.002)
+    clocks.pong_received(0.0, 1000.0005, 0.001)
+    clocks.pong_received(100.0, 1100.026, 100.002)
     assert clocks.ahead_s == pytest.approx(1000.025, abs=1e-3)

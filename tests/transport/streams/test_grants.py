@@ -1,4 +1,4 @@
-"""A stream goes to the key that it was granted to, once, and to nobody else."""
+"""A stream goes to the key that it was granted to, once, and to no other key."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ async def test_ended_stream_is_cut() -> None:
         granted, raw = await opened(host)
         granted.outgoing.end(Problem("STREAM_ENDED", "withdrawn"))
         assert isinstance(await raw.hears(), Over)
-        assert not granted.outgoing.has_room
+        assert not granted.outgoing.can_send
         await works(host)
 
 
@@ -237,7 +237,7 @@ async def test_message_without_an_end_is_cut() -> None:
         await works(host)
 
 
-async def test_message_whose_end_is_held_back_is_cut() -> None:
+async def test_sender_of_a_message_without_its_last_part_is_cut() -> None:
     """It is never handed over by ZeroMQ, and so is known only by what the kernel has received."""
     async with owner() as host, stalling(host.port, to_port=600_000, to_client=10_000_000) as port:
         granted = host.grant(READER)

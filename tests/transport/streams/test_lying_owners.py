@@ -68,7 +68,7 @@ async def test_silent_owner_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None
         assert (await within(reading.over)).code == "STREAM_SILENT"
 
 
-async def test_frame_whose_end_is_held_back_ends_the_stream(
+async def test_frame_without_its_last_part_ends_the_stream(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It would grow here, part by part, and never be handed over by ZeroMQ."""

@@ -13,11 +13,11 @@ FRAME = 900_000
 def test_two_frames_keep_the_link_busy() -> None:
     window = Window()
     window.sent(1, FRAME, 0.0)
-    assert window.has_room
+    assert window.can_send
     window.sent(2, FRAME, 0.0)
-    assert not window.has_room
+    assert not window.can_send
     assert window.handled(1, 0.01, round_trip_s=0.001)
-    assert window.has_room
+    assert window.can_send
 
 
 def test_frames_that_fill_a_slow_link_go_one_at_a_time() -> None:
@@ -25,10 +25,10 @@ def test_frames_that_fill_a_slow_link_go_one_at_a_time() -> None:
     window.sent(1, FRAME, 0.0)
     window.handled(1, 0.5, round_trip_s=0.002)
     window.sent(2, FRAME, 0.5)
-    assert not window.has_room
+    assert not window.can_send
     window.handled(2, 0.53, round_trip_s=0.002)
     window.sent(3, FRAME, 0.53)
-    assert window.has_room
+    assert window.can_send
 
 
 def test_long_way_is_not_a_slow_link() -> None:
@@ -36,15 +36,15 @@ def test_long_way_is_not_a_slow_link() -> None:
     window.sent(1, FRAME, 0.0)
     window.handled(1, 0.35, round_trip_s=0.3)
     window.sent(2, FRAME, 0.35)
-    assert window.has_room
+    assert window.can_send
 
 
 def test_small_messages_do_not_wait_for_each_other() -> None:
     window = Window()
     for seq in range(1, SMALL_MESSAGES + 1):
-        assert window.has_room
+        assert window.can_send
         window.sent(seq, 100, 0.0)
-    assert not window.has_room
+    assert not window.can_send
 
 
 def test_only_the_next_can_be_handled() -> None:
@@ -68,10 +68,10 @@ def test_little_is_under_way(steps: list[int | None]) -> None:
             oldest = min(lengths)
             del lengths[oldest]
             assert window.handled(oldest, now_s, 0.001)
-        elif step is not None and window.has_room:
+        elif step is not None and window.can_send:
             seq += 1
             lengths[seq] = step
             window.sent(seq, step, now_s)
         assert len(lengths) <= SMALL_MESSAGES
         assert sum(sorted(lengths.values())[:-FRAMES]) <= SMALL_BYTES
-        assert lengths or window.has_room
+        assert lengths or window.can_send

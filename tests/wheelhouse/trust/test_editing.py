@@ -46,10 +46,10 @@ ROLE = Role("lab", ("org.lab",), ("carol",))
         pytest.param(
             lambda trust: editing.rotated(trust, "eve", CAROL.public, until=None),
             "KEY_UNKNOWN",
-            id="nobody to replace",
+            id="no key to replace",
         ),
         pytest.param(
-            lambda trust: editing.found(trust, "eve"), "KEY_UNKNOWN", id="nobody of that name"
+            lambda trust: editing.found(trust, "eve"), "KEY_UNKNOWN", id="no key of that name"
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Whom a payload is believed from, and what each attack on that is answered with."""
+"""The signers that a payload is believed from, and the refusal of each attack on that."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_a_list_that_is_none_is_not_even_parsed_unsigned() -> None:
     assert codes(judged(ALICE, data=b"\xff")) == ["CONTENTS_ENCODING"]
 
 
-def test_a_host_without_trust_file_believes_nobody_and_says_how_to_begin() -> None:
+def test_a_host_without_trust_file_trusts_no_signer_and_says_how_to_begin() -> None:
     (problem,) = judged(ALICE, trust=None).problems
     assert problem.code == "SIG_UNTRUSTED"
     assert problem.have == ALICE.public.fingerprint
@@ -153,7 +153,7 @@ def test_a_role_ends_at_a_dot() -> None:
 
 
 def test_the_closest_role_alone_has_an_id() -> None:
-    """Else whoever may bring anything could replace what a maker has brought."""
+    """Else a signer that may bring anything could replace what a maker has brought."""
     trust = trust_of(roots=[ROOT], roles={"all": (["*"], [ALICE]), "acme": (["com.acme"], [BOB])})
     assert codes(judged(ALICE, trust=trust)) == []
     assert codes(judged(ALICE, data=listed("com.acme.arm"), trust=trust)) == ["ID_OWNED_BY"]

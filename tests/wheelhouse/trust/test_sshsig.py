@@ -61,7 +61,7 @@ def test_ssh_keygen_believes_what_the_tests_sign(tmp_path: Path, key: Key, hash:
     assert found.holds(DATA)
 
 
-def test_a_token_that_nobody_touched_has_signed_nothing() -> None:
+def test_a_signature_without_touch_of_the_token_is_refused() -> None:
     (found,) = sshsig.parse(TOKEN.sign(DATA, PAYLOAD, flags=0), "")
     assert not found.holds(DATA)
 
@@ -158,7 +158,7 @@ def test_what_is_no_signature_file_is_malformed(text: str) -> None:
 
 
 def test_base64_has_one_form_only() -> None:
-    """Else two files would be one signature: the last character has bits that nobody reads."""
+    """Else two files would be one signature: the last character has bits that no parser reads."""
     body = blob(key=ALICE.public.blob, namespace=b"of-some-length", signature=INNER)
     text = base64.b64encode(body).decode()
     assert text.endswith("==")

@@ -34,7 +34,7 @@ def test_the_next_version_follows() -> None:
 
 
 UNSIGNED = {
-    "nobody": signed(SECOND),
+    "none": signed(SECOND),
     "too few": signed(SECOND, ALICE),
     "one twice": signed(SECOND, ALICE, ALICE),
     "a stranger": signed(SECOND, ALICE, MALLORY),
@@ -111,7 +111,7 @@ def test_former_roots_have_nothing_to_say_any_more() -> None:
     assert succession.successor(ROTATED, signed(third, CAROL, DAVE)) == third
 
 
-def test_a_root_is_revoked_by_the_others() -> None:
+def test_a_root_is_revoked_by_the_other_roots() -> None:
     gone = (Revocation(ALICE.public.fingerprint, "lost"),)
     roots = replace(FIRST.roots, keys=FIRST.roots.keys[1:])
     second = replace(SECOND, roots=roots, revoked=gone)
@@ -121,7 +121,7 @@ def test_a_root_is_revoked_by_the_others() -> None:
     assert refusal(signed(still, BOB, CAROL)) == "TRUST_VALUE"
 
 
-def test_the_threshold_in_force_counts_not_the_one_that_is_wished_for() -> None:
+def test_the_current_threshold_counts_not_that_of_the_new_file() -> None:
     easier = replace(SECOND, roots=replace(FIRST.roots, threshold=1))
     assert refusal(signed(easier, MALLORY)) == "TRUST_SIGNATURE"
     assert refusal(signed(easier, ALICE)) == "TRUST_SIGNATURE"
@@ -190,7 +190,7 @@ FALSELY = {
 
 
 @pytest.mark.parametrize("file", FALSELY.values(), ids=FALSELY)
-def test_the_first_file_is_signed_by_enough_of_its_own_roots(file: SignedFile) -> None:
+def test_the_first_file_is_signed_by_enough_of_its_roots(file: SignedFile) -> None:
     assert succession.first(signed(FIRST, ALICE, BOB)) == FIRST
     assert first_refusal(succession.first, file) == ["TRUST_SIGNATURE"]
     assert first_refusal(succession.first, signed(FIRST)) == ["TRUST_SIGNATURE"]

@@ -1,4 +1,4 @@
-"""Whom this host believes, what plans for it, and what it was told to be."""
+"""Checks of the trust file, the keys and the planners of this host."""
 
 from __future__ import annotations
 
@@ -70,4 +70,4 @@ def judge_planners(names: Collection[str]) -> Finding:
     if names:
         return ok("planner", ", ".join(names))
     told = "no planner is installed: no goal has a plan"
-    return bad("planner", told, "install nondum anew, with its planners")
+    return bad("planner", told, "install nondum again, with its planners")

@@ -42,7 +42,7 @@ def judge_helper(error: str, uid: int, path: Path = SOCKET) -> Finding:
 def judge_service(*, is_systemd: bool, link: Path) -> Finding:
     """Whether the daemon is started at boot."""
     if not is_systemd:
-        return ok("service", "there is no systemd here: whoever starts the daemon does so")
+        return ok("service", "there is no systemd here: something else starts the daemon")
     if link.is_symlink():
         return ok("service", "it is started at boot")
     told = "it is not started at boot"
@@ -71,7 +71,7 @@ def _daemon(control: Path) -> Finding:
 
 
 def _reached(path: Path) -> str:
-    """Why nobody is reached; empty: somebody listens."""
+    """Why no process is reached at a socket; empty: a process listens there."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as sock:
         sock.settimeout(PATIENCE_S)
         try:

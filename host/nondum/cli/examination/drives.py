@@ -25,6 +25,6 @@ def judge(disk: Disk) -> Finding:
     told = {
         Owner.HOST: f"this machine's own, and left alone: {disk.why}",
         Owner.DRIVE: "read as a drive",
-        Owner.NOBODY: disk.why,
+        Owner.NONE: disk.why,
     }[disk.owner]
     return ok("drives", told, subject=disk.name)

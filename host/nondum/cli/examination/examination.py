@@ -37,17 +37,17 @@ def examine(asked: Asked) -> Iterator[Finding]:
 def confinement(config: HostConfig) -> Iterator[Finding]:
     """At which level workers would be confined."""
     try:
-        standing = confinement_choice.standing(
+        confinement_state = confinement_choice.confinement_state(
             config.workers.confinement, config.workers.minimum_confinement
         )
     except ConfigRefused as refused:
         for problem in refused.problems:
             yield bad("confinement", str(problem), "see `nondum doctor confinement`")
         return
-    yield ok("confinement", f"{standing.level} ({standing.mechanism})")
+    yield ok("confinement", f"{confinement_state.level} ({confinement_state.mechanism})")
 
 
-def others(config: HostConfig) -> Iterator[Finding]:
+def discovery(config: HostConfig) -> Iterator[Finding]:
     """Whether other hosts can be found, where they are looked for."""
     if not config.peers.enabled:
         yield ok("network", "this host has nothing to do with others (`peers.enabled`)")
@@ -71,5 +71,5 @@ PARTS: tuple[Examine, ...] = (
     drives.examine,
     clock.examine,
     beliefs.examine,
-    others,
+    discovery,
 )

@@ -15,7 +15,7 @@ USB = Path("/sys/bus/usb/devices")
 SOUND = Path("/proc/asound/cards")
 _ON_A_PI = (
     "add `cgroup_enable=memory cgroup_memory=1` to the kernel's command line "
-    "(/boot/firmware/cmdline.txt), and start the machine anew"
+    "(/boot/firmware/cmdline.txt), and restart the machine"
 )
 
 
@@ -45,7 +45,7 @@ def judge_udev(*, is_there: bool, is_wanted: bool) -> Finding:
         return ok("udev", "it runs")
     if not is_wanted:
         return ok("udev", "it does not run, and is not asked for (`devices.udev`)")
-    told = "it does not run: nobody tells what is plugged in"
+    told = "it does not run: the host does not learn which devices are plugged in"
     return bad("udev", told, "start systemd-udevd, or set `udev = false` under [devices]")
 
 

@@ -1,4 +1,4 @@
-"""Whether there is room for what is plugged in, and for what must be written down."""
+"""Checks of the disk space for payloads and for the state of the host."""
 
 from __future__ import annotations
 
@@ -38,11 +38,12 @@ def judge_folder(state: Path, *, is_there: bool, may_write: bool) -> Finding:
 
 
 def judge_free(free_mb: int, reserve_mb: int, quota_mb: int) -> Finding:
-    """Whether payloads have room. Pure."""
+    """Whether there is space for payloads. Pure."""
     if free_mb <= reserve_mb:
         told = f"{free_mb} MB are free, and {reserve_mb} MB stay free whatever is plugged in"
-        return bad("disk", told, "make room: no payload is installed until then")
+        return bad("disk", told, "free some space: no payload is installed until then")
     if free_mb < reserve_mb + quota_mb // 4:
         told = f"{free_mb} MB are free, of which {reserve_mb} MB are reserved; wheels may need more"
-        return warn("disk", told, f"make room, or lower `quota_mb` ({quota_mb}) under [install]")
+        fix = f"free some space, or lower `quota_mb` ({quota_mb}) under [install]"
+        return warn("disk", told, fix)
     return ok("disk", f"{free_mb} MB are free, of which {reserve_mb} MB are reserved")

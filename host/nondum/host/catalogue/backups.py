@@ -110,7 +110,7 @@ def _writing(path: Path) -> Iterator[sqlite3.Connection]:
 
 def _is_whole(path: Path) -> bool:
     try:
-        # Immutable: nobody writes to it, and no log is made beside it.
+        # Immutable: nothing writes to it, and SQLite makes no log beside it.
         with _reading(path, "immutable=1") as connection:
             (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         return bool(verdict == "ok")

@@ -1,7 +1,7 @@
 """The catalogue: the host's state as it was last committed, and the journal of how it came to it.
 
-All SQLite work happens on one thread of its own, in the order asked for, so that a slow disk never
-stops the daemon's loop.
+One separate thread does all SQLite work, in the order of the calls, so that a slow disk never stops
+the daemon's loop.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Catalogue:
         """What the file holds."""
         self._state = opened.state
         self._owed: deque[JournalEntry] = deque(maxlen=OWED_LIMIT)
-        # What the last daemon left is for recovery only: nobody else sees it.
+        # What the last daemon left is for recovery only: readers do not see it.
         self._snapshot = Snapshot(opened.state.host, opened.state.revision)
         self._thread = thread
         self._keep = keep
@@ -56,7 +56,7 @@ class Catalogue:
         """Names this run of the daemon in the journal."""
         self.loss = opened.loss
         """What became of a file that could not be used, if there was one."""
-        self._is_begun_anew = False
+        self._is_new_file = False
         self._aside: Path | None = None
         """Whether the next file is a new one, and where the last one was moved."""
         self.commits = 0
@@ -67,8 +67,8 @@ class Catalogue:
 
     @classmethod
     async def open(cls, path: Path, host: str, *, keep: int = journal.KEEP) -> Catalogue:
-        """Open the file, or what there is in its place (see `opening`); of the journal, about so
-        many entries are kept.
+        """Open the file, or what there is in its place (see `opening`); the journal keeps about
+        `keep` entries.
 
         Raises `ConfigRefused` (CATALOGUE_VERSION, STATE_UNWRITABLE).
         """
@@ -109,9 +109,9 @@ class Catalogue:
         await work
 
     def owe(self, after: HostState, entries: Sequence[JournalEntry], why: Exception) -> None:
-        """Go on with a state that cannot be written: whoever starts next may not find it.
+        """Continue with a state that cannot be written: the next daemon may not find it.
 
-        The next commit that works writes it, too.
+        The next commit that succeeds writes it, too.
         """
         self._owed.extend(entries)
         self.unwritten = opening.unwritten(self._path, why)
@@ -167,9 +167,9 @@ class Catalogue:
                     raise
                 tried.add(cure)
         self._held = after
-        if self._is_begun_anew:
+        if self._is_new_file:
             self.loss = Loss(self._aside, Instead.MEMORY, after.revision)
-            self._is_begun_anew, self._aside = False, None
+            self._is_new_file, self._aside = False, None
         if self._reserve.release not in tried:
             self._reserve.take()
 
@@ -177,7 +177,7 @@ class Catalogue:
         """What may help; it says whether it has done something."""
         if database.is_damaged(error):
             return self._set_aside
-        if database.is_out_of_room(error):
+        if database.is_disk_full(error):
             return self._reserve.release
         return self._disconnect if database.is_locked_for_good(error) else None
 
@@ -197,7 +197,7 @@ class Catalogue:
         """The connection. One that is new goes by what it finds: the file may be gone or another
         one. Raises `sqlite3.DatabaseError`, `OSError`."""
         if self._connection is None:
-            self._is_begun_anew = self._is_begun_anew or not self._path.exists()
+            self._is_new_file = self._is_new_file or not self._path.exists()
             try:
                 self._connection, self._held = database.opened(self._path, self._state.host)
             except ConfigRefused as error:  # another nondum's has been put there

@@ -39,7 +39,7 @@ _UPGRADES = {
     "CREATE TRIGGER journal_is_never_deleted BEFORE DELETE ON journal"
     " WHEN old.id > (SELECT max(id) FROM journal) - 1000"
     " BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END;",
-    # Devices are told anew by every daemon that starts.
+    # Every daemon that starts reads the devices again.
     4: "UPDATE claims SET device = NULL; DROP TABLE devices;"
     "ALTER TABLE claims ADD COLUMN nodes TEXT NOT NULL DEFAULT '[]';"
     "CREATE TABLE devices (id TEXT PRIMARY KEY, bus TEXT NOT NULL, port TEXT NOT NULL,"
@@ -136,12 +136,12 @@ def opened(path: Path, host: str) -> tuple[sqlite3.Connection, HostState]:
 
 
 def is_damaged(error: BaseException) -> bool:
-    """Whether the file itself is broken, not only out of reach or out of room."""
+    """Whether the file itself is damaged; a disk that is unreachable or full does not count."""
     return _code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
-def is_out_of_room(error: Exception) -> bool:
-    """Whether a full disk may be what is wrong: SQLite tells of some as errors of the disk."""
+def is_disk_full(error: Exception) -> bool:
+    """Whether a full disk may be the cause: SQLite reports some full disks as I/O errors."""
     is_full = isinstance(error, OSError) and error.errno == errno.ENOSPC
     return is_full or _code(error) in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 
@@ -275,7 +275,7 @@ def _write_state(connection: sqlite3.Connection, before: HostState, after: HostS
         ),
         ("goals", "id", before.goals, after.goals, rows.goal_row),
         ("former", "payload_id", before.former, after.former, rows.former_row),
-        ("tries", "subject", _tries(before), _tries(after), _try_row),
+        ("tries", "subject", _try_counts(before), _try_counts(after), _try_row),
         ("connections", "input", _connections(before), _connections(after), _connection_row),
     )
     for table, key, old, new, as_row in simple:
@@ -315,7 +315,7 @@ def _host_row(state: HostState) -> rows.Row:
     return {"name": state.host, "revision": state.revision, "stopped": int(state.is_stopped)}
 
 
-def _tries(state: HostState) -> dict[str, tuple[str, int]]:
+def _try_counts(state: HostState) -> dict[str, tuple[str, int]]:
     return {subject: (subject, deaths) for subject, deaths in state.tries.items()}
 
 

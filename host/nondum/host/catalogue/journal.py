@@ -10,11 +10,11 @@ from nondum.host.catalogue import rows
 from nondum.host.core.records import JournalEntry, Moment
 
 KEEP = 20_000
-"""So many of the last entries are kept unless somebody says otherwise: some eight megabytes."""
+"""Entries that are kept, the last ones, unless the caller sets a number: some eight megabytes."""
 KEEP_LEAST = 1000
 """Fewer are never kept; the schema sees to that, too."""
 BATCH = 200
-"""So many of the oldest are let go together."""
+"""The oldest entries are deleted in batches of this size."""
 PROBLEMS_LIMIT = 50
 """Problems of one entry: a payload may have thousands, and its record has them all."""
 
@@ -23,7 +23,8 @@ PROBLEMS_LIMIT = 50
 class Since:
     """A moment in the past, for entries of this run of the daemon and of others.
 
-    Of this run's entries the clock that nobody sets counts: a robot may learn the time late.
+    For entries of this run the monotonic clock counts, which no one sets: a robot may learn the
+    time late.
     """
 
     boot: str

@@ -87,7 +87,7 @@ def _was_there(path: Path, backups: Backups) -> bool:
 
 
 def _opened(path: Path, host: str) -> Opened | None:
-    """The file as it is; None: it is damaged, or says what nobody can read."""
+    """The file as it is; None: it is damaged, or its content cannot be decoded."""
     try:
         return Opened(*database.opened(path, host))
     except sqlite3.DatabaseError as error:
@@ -123,9 +123,9 @@ def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
 
 
 _INSTEAD = {
-    Instead.BACKUP: "a copy of revision {} took its place, and drives are read anew",
+    Instead.BACKUP: "a copy of revision {} took its place, and drives are read again",
     Instead.MEMORY: "what the running daemon knew (revision {}) was written to a new one",
-    Instead.NOTHING: "there was no copy of it, so a new one was begun, and drives are read anew",
+    Instead.NOTHING: "there was no copy of it, so a new one was begun, and drives are read again",
 }
 _LOST = {
     Instead.BACKUP: "lost: what was told, set and asked for since the copy was made",
@@ -142,7 +142,7 @@ def unwritten(path: Path, why: Exception) -> Problem:
         f"the catalogue cannot be written ({why}); what happens now may be forgotten when this "
         "host starts again",
         where=str(path),
-        fix="see to it that the disk works and has room; it is tried again all the time",
+        fix="see to it that the disk works and has free space; nondum keeps trying",
     )
 
 
@@ -151,5 +151,5 @@ def _unwritable(path: Path, error: Exception) -> Problem:
         "STATE_UNWRITABLE",
         f"the catalogue can neither be read nor made ({error})",
         where=str(path),
-        fix="see to it that the disk works, has room, and that this user may write there",
+        fix="see to it that the disk works, has free space, and that this user may write there",
     )

@@ -15,17 +15,17 @@ SPARE_BYTES = 4 * RESERVE_BYTES
 
 @dataclass(frozen=True, slots=True)
 class Reserve:
-    """A file that takes room until somebody needs it."""
+    """A file that takes disk space until the catalogue needs it."""
 
     path: Path
 
     def take(self) -> bool:
-        """Set the room aside, unless that is done or there is too little; whether it is there."""
+        """Take the space, unless it is taken or the disk has too little; whether it is taken."""
         if self.is_taken:
             return True
         try:
-            room = os.statvfs(self.path.parent)
-            if room.f_bavail * room.f_frsize < RESERVE_BYTES + SPARE_BYTES:
+            disk = os.statvfs(self.path.parent)
+            if disk.f_bavail * disk.f_frsize < RESERVE_BYTES + SPARE_BYTES:
                 return False
             descriptor = os.open(self.path, os.O_CREAT | os.O_WRONLY | os.O_CLOEXEC, 0o600)
             try:
@@ -38,7 +38,7 @@ class Reserve:
         return True
 
     def release(self) -> bool:
-        """Give the room up for what must be written now; whether there was any."""
+        """Free the space for what must be written now; whether there was any."""
         was_taken = self.is_taken
         with contextlib.suppress(OSError):
             self.path.unlink(missing_ok=True)
@@ -46,7 +46,7 @@ class Reserve:
 
     @property
     def is_taken(self) -> bool:
-        """Whether the room is set aside."""
+        """Whether the space is taken."""
         try:
             return self.path.stat().st_size >= RESERVE_BYTES
         except OSError:

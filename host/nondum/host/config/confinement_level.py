@@ -38,7 +38,7 @@ class Finding:
     fix: str = ""
     """What a person can do about that."""
     has_users: bool = False
-    """Whether each worker is a user of its own to the kernel."""
+    """Whether each worker is a separate user to the kernel."""
 
     @property
     def mechanism(self) -> str:
@@ -73,7 +73,7 @@ class ConfinementState:
 
     @property
     def has_users(self) -> bool:
-        """Whether each worker is a user of its own to the kernel."""
+        """Whether each worker is a separate user to the kernel."""
         return any(f.has_users for f in self.findings if f.level is self.level)
 
     @property
@@ -115,12 +115,12 @@ def chosen(findings: tuple[Finding, ...], wanted: Wanted) -> ConfinementState:
 
 def refusals(findings: tuple[Finding, ...], wanted: Wanted, minimum: Level) -> Iterator[Problem]:
     """Why this host may not start as it is configured; nothing when it may."""
-    standing = chosen(findings, wanted)
-    if wanted != "auto" and standing.level != wanted:
-        yield _too_low(findings, wanted, f'[workers] confinement = "{wanted}"', standing)
-    elif standing.level < minimum:
+    state = chosen(findings, wanted)
+    if wanted != "auto" and state.level != wanted:
+        yield _too_low(findings, wanted, f'[workers] confinement = "{wanted}"', state)
+    elif state.level < minimum:
         where = f'[workers] minimum_confinement = "{minimum}"'
-        yield _too_low(findings, minimum, where, standing)
+        yield _too_low(findings, minimum, where, state)
 
 
 def _too_low(

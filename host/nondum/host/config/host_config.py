@@ -175,8 +175,8 @@ class PeersSection:
     static: tuple[str, ...] = ()
     """Hosts to look for where multicast does not reach: `HOST` or `HOST:PORT`."""
     process: bool = False
-    """Hold the links to other hosts in a process of their own, with a memory limit: what they send
-    cannot fill the daemon's memory then. Links by way of a router stay in the daemon."""
+    """Hold the links to other hosts in a separate process with a memory limit: what these hosts
+    send cannot fill the daemon's memory then. Links by way of a router stay in the daemon."""
     development: bool = False
     """No keys: every host on this machine is a peer. Nothing leaves the machine; every status says
     so."""

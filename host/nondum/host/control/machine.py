@@ -96,7 +96,7 @@ class Machine:
         for zone in self.temperatures:
             if zone.is_hot:
                 told = f"the machine is hot ({zone.name} {zone.celsius:.0f} °C)"
-                yield f"{told}: give it air, or less to do"
+                yield f"{told}: cool it, or give it less to do"
         if self.load is not None and self.load.five_min > BUSY * self.load.processors:
             told = f"the machine is overloaded (load {self.load.five_min:.1f} over five minutes"
             yield f"{told}, {self.load.processors} processors): all takes longer"
@@ -145,9 +145,9 @@ def _of_disk(disk: Disk) -> Iterator[str]:
     left_mb = disk.free_mb - disk.reserve_mb
     free = f"{disk.free_mb} MB are free at {disk.path}, of which {disk.reserve_mb} MB are kept free"
     if left_mb <= 0:
-        yield f"the disk has no room for payloads ({free}): none is installed until there is"
+        yield f"the disk has no space for payloads ({free}): none is installed until there is"
     elif left_mb < LOW_MB:
-        yield f"the disk has room for {left_mb} MB of payloads ({free}): one may need more"
+        yield f"the disk has space for {left_mb} MB of payloads ({free}): one may need more"
 
 
 def _is_low(battery: Battery) -> bool:

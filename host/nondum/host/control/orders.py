@@ -88,7 +88,7 @@ class Orders:
         """
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
-            raise GoalRefused(Problem("GOAL_AMISS", "a goal is given in words, or in PDDL"))
+            raise GoalRefused(Problem("GOAL_FORM", "a goal is given in words, or in PDDL"))
         if words is not None and is_stop(words):
             return {"stopped": (await self.stop_all()).to_dict()}
         if words is not None and (answer := await self.answer(words)) is not None:
@@ -98,7 +98,7 @@ class Orders:
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
         said, understood = arguments.optional_text("said"), None
         if words is not None and self.elsewhere is not None:
-            peer, words = await self.elsewhere.whose(words)
+            peer, words = await self.elsewhere.addressee(words)
             if peer is not None:
                 return await self.elsewhere.give(peer, words, priority)
         elif words is not None:
@@ -133,11 +133,11 @@ class Orders:
         """
         words = arguments.text("words")
         answer = await self.answer(words)
-        return {"answer": answer if answer is not None else await self.heard(words)}
+        return {"answer": answer if answer is not None else await self.take_words(words)}
 
-    async def heard(self, words: str) -> str:
-        """Want what a person has said: what becomes of it, in words. What means nothing yet is kept
-        while anything is being installed. Raises `GoalRefused`."""
+    async def take_words(self, words: str) -> str:
+        """Take a person's words as a goal: the answer, in words. Words that mean nothing yet are
+        kept while anything is being installed. Raises `GoalRefused`."""
         try:
             return await self.take(words)
         except GoalRefused as refused:
@@ -147,7 +147,7 @@ class Orders:
             if self.elsewhere is None:
                 words = self._unaddressed(words)
             else:
-                peer, words = await self.elsewhere.whose(words)
+                peer, words = await self.elsewhere.addressee(words)
                 if peer is not None:
                     raise
         given = self._keep(words, is_translated=False, while_coming=True)

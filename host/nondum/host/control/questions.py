@@ -38,7 +38,7 @@ from nondum.host.core.records import Moment, PayloadRecord, Step
 from nondum.host.core.unknown import unknown
 from nondum.host.mind.mind import Mind
 from nondum.host.sources.devices import view
-from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import GoalRefused, NondumError, Problem
 
@@ -70,7 +70,7 @@ class Questions:
     """What every status says of this host."""
     places: Callable[[], Mapping[str, str]] = dict
     """Payload key → the peer that runs it, for those that run elsewhere."""
-    vouched: Callable[[str], Vouched] = lambda _: NOBODY
+    vouched: Callable[[str], Vouched] = lambda _: UNVOUCHED
     """Payload key → who vouches for it."""
     shown: Callable[[], Row] = NOTHING.to_dict
     """What people without a screen are shown."""
@@ -178,7 +178,7 @@ class Questions:
         return [view.known_row(known) for known in self.catalogue.snapshot().known_devices]
 
     async def streams(self, arguments: Arguments) -> list[Row]:
-        """Who sends what to whom."""
+        """The streams: the producer, the readers and the rate of each."""
         rates = self.workers.rates()
         listing = self.workers.streams.listing()
         return [stream_row(stream, rates.get(stream.stream)) for stream in listing]
@@ -242,11 +242,11 @@ class Questions:
         return {**self.mind.views.composition(), "devices": devices, "waiting": waiting}
 
     async def journal(self, arguments: Arguments) -> list[Row]:
-        """What happened, oldest first; with `since_s`, in so many seconds until now."""
+        """What happened, oldest first; with `since_s`, in the last `since_s` seconds."""
         return await self._journal(arguments)
 
     async def logs(self, arguments: Arguments) -> list[Row]:
-        """What components have written, by time; with `since_s`, in so many seconds until now.
+        """What components have written, by time; with `since_s`, in the last `since_s` seconds.
 
         Raises `NondumError` (COMPONENT_UNKNOWN).
         """

@@ -18,7 +18,7 @@ from nondum.host.core.records import (
     Step,
 )
 from nondum.host.core.status import is_at_rest, waits_for_devices
-from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.host.workers.optional_inputs import Choice, Source
 from nondum.host.workers.streams import StreamStatus
 from nondum.sdk.errors import Problem
@@ -54,7 +54,7 @@ def goals_away(rows: Iterable[Row]) -> Iterator[str]:
 
 
 def gone_back(snapshot: Snapshot) -> Iterator[PayloadRecord]:
-    """The releases in force that people went back to."""
+    """The active releases that people went back to."""
     return (
         payload
         for payload in snapshot.payloads
@@ -80,7 +80,7 @@ def payload_row(
     progress: Progress | None,
     place: str = "",
     rollbacks: Collection[str] = (),
-    vouched: Vouched = NOBODY,
+    vouched: Vouched = UNVOUCHED,
     components: Iterable[ComponentRecord] = (),
 ) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
@@ -132,7 +132,7 @@ def component_row(
     host: str,
     pid: int | None,
     payload: PayloadRecord | None,
-    vouched: Vouched = NOBODY,
+    vouched: Vouched = UNVOUCHED,
 ) -> Row:
     """A component: how it is, and what it brings."""
     described = component.description
@@ -181,7 +181,7 @@ def offered_row(component: PeerComponent, host: str) -> Row:
 
 
 def stream_row(stream: StreamStatus, rate_hz: float | None = None) -> Row:
-    """A stream: who sends it, how often as far as that is known, and to whom."""
+    """A stream: its producer, its rate (where it is known), and its readers."""
     return {
         "stream": stream.stream,
         "type": stream.type,

@@ -21,11 +21,11 @@ class TrustOrders:
     emit: Emit
 
     async def show(self, arguments: Arguments) -> dict[str, Any]:
-        """The trust file in force."""
+        """The active trust file."""
         return self.trust.row()
 
     async def give(self, arguments: Arguments) -> dict[str, Any]:
-        """Take the `file` (its text) that follows the one in force, with its `signature`.
+        """Take the `file` (its text) that follows the active one, with its `signature`.
 
         Raises `TrustRefused`.
         """

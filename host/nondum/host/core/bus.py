@@ -1,4 +1,4 @@
-"""The one way that events go: from whoever emits them to the manager and all listeners."""
+"""The event bus: takes events from all emitters to the manager and to all listeners."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class Bus:
-    """Takes events in; hands them to the manager in order, and to listeners."""
+    """Takes events in; passes them to the manager in order, and to listeners."""
 
     def __init__(self, decided: Container[type[Event]], clock: Callable[[], Moment] = now) -> None:
         """`decided` are the kinds of events that the manager decides something from."""
@@ -47,7 +47,7 @@ class Bus:
         return lambda: self._listeners.remove(listener)
 
     async def batch(self) -> list[Stamped]:
-        """Wait for events; all that are there then. Who asks is through with those before."""
+        """Wait for events; return all that are queued. The caller has handled those before."""
         self.followed = self._given
         batch = [await self._queue.get()]
         while not self._queue.empty():
@@ -56,13 +56,13 @@ class Bus:
         return batch
 
     def tell(self, events: Sequence[Event]) -> None:
-        """Tell listeners what has happened. One that is at fault is nobody else's trouble."""
+        """Tell listeners what has happened. An error of one does not affect the others."""
         for event in events:
             for listener in tuple(self._listeners):
                 try:
                     listener(event)
                 except Exception:
-                    log.exception("a listener is at fault over %s", event.name)
+                    log.exception("a listener raised an error at %s", event.name)
 
     def is_told_early(self, event: Event) -> bool:
         """Whether listeners hear of an event before (or without) its being journalled."""

@@ -39,7 +39,7 @@ class ReleaseDrive(Effect):
 
 @dataclass(frozen=True, slots=True)
 class JudgePayloads(Effect):
-    """Ask anew whether payloads that are here are trusted."""
+    """Check again whether payloads that are here are trusted."""
 
     payloads: tuple[str, ...]
 
@@ -59,7 +59,7 @@ class CopyPayload(PayloadEffect):
     folder: Path
     digest: str
     beside: str = ""
-    """Key of the release of it that is in force, which would make room for it."""
+    """Key of its active release, whose memory would become free for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class StoreWheels(PayloadEffect):
     """Unpack each wheel that the store lacks into it, and promise it the memory that it needs."""
 
     beside: str = ""
-    """Key of the release of it that is in force, which would make room for it."""
+    """Key of its active release, whose memory would become free for it."""
     renamed: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Id in the manifest → name on this host, of those components where that is another."""
 
@@ -87,7 +87,7 @@ class ProbeComponents(PayloadEffect):
     """Make the venvs, start the workers, compare what they say with the index."""
 
     beside: str = ""
-    """Key of the release of it that is in force, and goes on meanwhile."""
+    """Key of its active release, which runs on meanwhile."""
     after: str = ""
     """Key of a payload whose workers must have ended first."""
     renamed: Mapping[str, str] = field(default_factory=dict, hash=False)

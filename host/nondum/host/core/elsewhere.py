@@ -11,7 +11,7 @@ from nondum.host.core.plain import Row
 class Elsewhere(Protocol):
     """The other hosts: a seam, for a host without peers does not import what is behind it."""
 
-    async def whose(self, words: str) -> tuple[str | None, str]:
+    async def addressee(self, words: str) -> tuple[str | None, str]:
         """The peer whose goal words are, None for this host; and the words without its name.
 
         Raises `GoalRefused` (WHOSE_GOAL).

@@ -39,7 +39,7 @@ class Event:
 
 
 Emit: TypeAlias = Callable[[Event], None]
-"""Hands an event on; never blocks, called on the loop's thread."""
+"""Passes an event on; never blocks, called on the loop's thread."""
 
 
 # Drives
@@ -64,7 +64,7 @@ class DriveInserted(Event):
     port: str = ""
     """Where it is plugged in, as far as that is known: whatever comes there next has the same."""
     mark: str = ""
-    """What it is by its own word, the same after the machine has been started anew; empty: none."""
+    """What it says that it is, the same after the machine has started again; empty: nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ class PayloadFound(Event):
     grant: Grant = NOTHING
     """What it may have, if it is believed."""
     built: str = ""
-    """When, as whoever signed it says: UTC, ISO 8601."""
+    """When, as its signers say: UTC, ISO 8601."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +280,7 @@ class TrustRead(Event):
 
 @dataclass(frozen=True, slots=True)
 class TrustChanged(Event):
-    """Another version of the trust file is in force, and safe on disk."""
+    """Another version of the trust file is active, and safe on disk."""
 
     owner: str
     version: int
@@ -290,7 +290,7 @@ class TrustChanged(Event):
 
 @dataclass(frozen=True, slots=True)
 class TrustFileRefused(Event):
-    """A trust file was not taken; the one in force stays."""
+    """A trust file was not taken; the active one stays."""
 
     source: str
     """The drive that brought it."""
@@ -332,7 +332,7 @@ class PayloadSentAway(Event):
 
 @dataclass(frozen=True, slots=True)
 class BesideRefused(Event):
-    """A release cannot run beside the one in force, which has to stop first."""
+    """A release cannot run beside the active one, which has to stop first."""
 
     payload: str
     reason: str
@@ -340,7 +340,7 @@ class BesideRefused(Event):
 
 @dataclass(frozen=True, slots=True)
 class PayloadSuperseded(Event):
-    """Another release of the payload is in force, or on its way there; this one waits beside it."""
+    """Another release of the payload is active or becomes active; this one waits beside it."""
 
     payload: str
     by: str
@@ -358,8 +358,8 @@ class PayloadResumed(Event):
 
 @dataclass(frozen=True, slots=True)
 class RollbackAsked(Event):
-    """A person asked that an earlier release of a payload be in force, this once: rollback
-    protection lets it pass until it is unplugged or a newer one comes."""
+    """A person asked for an earlier release of a payload, this once: rollback protection lets it
+    pass until it is unplugged or a newer one comes."""
 
     payload: str
     """Key of the earlier release."""
@@ -624,7 +624,7 @@ class WorkerFaulted(Event):
 
 @dataclass(frozen=True, slots=True)
 class InputAmbiguous(Event):
-    """Several streams fit an optional input, and nobody has said which it is to get."""
+    """Several streams fit an optional input, and the configuration does not say which it gets."""
 
     component: str
     problems: tuple[Problem, ...]
@@ -632,7 +632,7 @@ class InputAmbiguous(Event):
 
 @dataclass(frozen=True, slots=True)
 class TrialFailed(Event):
-    """A worker ended that was tried beside the one in force: its release does not work."""
+    """A worker ended that was tried beside the active one: its release does not work."""
 
     payload: str
     component: str
@@ -802,7 +802,7 @@ class CertificatesBrought(Event):
 
     drive: str
     certificates: tuple[str, ...] = field(repr=False)
-    """As they were read: nobody has checked them."""
+    """As they were read: nothing has checked them."""
 
     def to_dict(self) -> dict[str, Any]:
         """Only how many: anybody can write a drive."""

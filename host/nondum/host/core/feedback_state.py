@@ -26,7 +26,7 @@ PRIORITY = tuple(State)
 
 
 @dataclass(frozen=True, slots=True)
-class Concern:
+class StateReason:
     """One reason for a state."""
 
     state: State
@@ -50,5 +50,5 @@ class Concern:
         }
 
 
-NOTHING = Concern(State.READY, "", "ready")
+NOTHING = StateReason(State.READY, "", "ready")
 """What is shown when nothing else is."""

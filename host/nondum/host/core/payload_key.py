@@ -1,6 +1,6 @@
 """What a host calls a payload: the first half of the SHA-256 of its contents list, in hex.
 
-128 bits, so that nobody who may sign can make two lists of one key. Versions of nondum whose
+128 bits, so that no signer can make two lists of one key. Versions of nondum whose
 catalogue has schema 6 or less took 64 bits; a payload that came under one keeps that key while it
 is there.
 """

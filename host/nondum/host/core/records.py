@@ -39,7 +39,7 @@ class Step(Enum):
     ACTIVE = "active"
     """Its components are in the catalogue and may act."""
     SUPERSEDED = "superseded"
-    """Another release of it is in force, or is tried first; it waits, installed, to come back."""
+    """Another release of it is active, or is tried first; it waits, installed, to come back."""
     REMOVING = "removing"
     """Withdrawn; its processes end and its files are deleted."""
     REFUSED = "refused"
@@ -284,7 +284,7 @@ class PeerRecord:
     admitted_by: str
     """`pairing`, `certificate` or `development`."""
     life: str
-    """Names its run: another one after it was started anew."""
+    """Names its run: another one after it was started again."""
     components: tuple[PeerComponent, ...] = ()
     mounts: tuple[MountPose, ...] = ()
     devices: Mapping[str, str] = field(default_factory=dict)
@@ -351,7 +351,7 @@ class PayloadRecord:
 
 @dataclass(frozen=True, slots=True)
 class Rollback:
-    """A person wants an earlier release of a payload to be in force."""
+    """A person wants an earlier release of a payload to be active."""
 
     digest: str
     """The release that is to be."""

@@ -7,7 +7,7 @@ from typing import Any
 
 
 async def until_done(task: asyncio.Task[Any]) -> None:
-    """Wait for a task that ends soon; whoever is cancelled meanwhile hears of it afterwards."""
+    """Wait for a task that ends soon; a cancellation of the caller is raised afterwards."""
     cancelled: asyncio.CancelledError | None = None
     while not task.done():
         try:

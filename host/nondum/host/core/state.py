@@ -63,7 +63,7 @@ class HostState:
     is_stopped: bool = False
     """Whether the daemon that wrote this ended because it was told to."""
     peers: Mapping[str, PeerRecord] = field(default_factory=dict)
-    """Key → a peer that is there. Not kept when the daemon ends: who is there is found out anew."""
+    """Key → a peer that is there. Not kept when the daemon ends: the next one looks again."""
     safety: Safety = Safety.OFF
     """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
 

@@ -31,13 +31,13 @@ QUIET_S = 30.0
 """Without work for so long, no child is kept."""
 
 STALL_S = 60.0
-"""Silence that is borne from a child, unless its job is one that says more or less of itself."""
+"""Read timeout of a job process, unless its job reports progress more often or more rarely."""
 
 START_S = 60.0
 """How long the fork server may take to start, and a child until it begins with its job."""
 
 ASIDE_STALL_S = 600.0
-"""Silence that is borne from a child that works only while nobody else does."""
+"""Read timeout of a job process that runs only while the processor is idle."""
 
 END_S = 1.0
 """How long a killed child is waited for: one that hangs in its disk cannot even die."""
@@ -58,7 +58,7 @@ class Children:
         self.forks = ForkClient("nondum.host.jobs.child", on_crowded)
         """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
         self._kept: dict[str, Forked] = {}
-        """Owner → the child that worked for it, and for nobody else; the last ones last."""
+        """Owner → the child that worked for this owner only; the last ones last."""
         self._busy: set[Forked] = set()
         self._left_behind: set[Forked] = set()
         """Those that were killed and have not ended yet: a disk may hold one for ever."""
@@ -100,7 +100,7 @@ class Children:
     async def run_aside(
         self, job: str, arguments: Mapping[str, Any], *, stall_s: float = ASIDE_STALL_S
     ) -> Any:
-        """Have a child of its own do a job with what processor and disk time nobody else wants.
+        """Have a separate child do a job with processor and disk time that is idle otherwise.
 
         Otherwise as `run`; the child ends with its job.
         """
@@ -148,7 +148,7 @@ class Children:
         await self.forks.close()
 
     async def _take(self, owner: str, job: str) -> Forked:
-        """A child that nobody else's bytes have touched."""
+        """A child that has read no bytes of another owner."""
         return self._kept.pop(owner, None) or await self._spawn(job)
 
     async def _spawn(self, job: str) -> Forked:
@@ -192,7 +192,7 @@ class Children:
 
     async def _end(self, child: Forked) -> None:
         self._busy.discard(child)
-        self._left_behind.add(child)  # whoever waits here may be cancelled: then `close` waits
+        self._left_behind.add(child)  # if this coroutine is cancelled here, `close` waits
         _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
         child.kill()
         try:
@@ -284,4 +284,4 @@ def _died(job: str, code: int) -> InstallFailed:
     return InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN))
 
 
-_TRY_AGAIN = "pull the drive and plug it in again; if that does not help, build it anew"
+_TRY_AGAIN = "pull the drive and plug it in again; if that does not help, build it again"

@@ -16,16 +16,16 @@ MEGABYTE = 1024 * 1024
 def compile_wheels(arguments: Arguments, report: Report) -> None:
     """Compile a payload's wheels in the store and link that into its venvs.
 
-    Idempotent; whoever ends it half way loses at most the wheel that is being compiled. Raises
+    Idempotent; ending it half way loses at most the wheel that is being compiled. Raises
     `InstallFailed` (STORE_MISSING, DISK_FULL, …).
     """
     staged = look.load_staged(Path(arguments["folder"]))
     facts = look.facts_of(arguments)
-    store, room = Store(Path(arguments["store"])), facts.free_disk_mb * MEGABYTE
+    store, space = Store(Path(arguments["store"])), facts.free_disk_mb * MEGABYTE
     compiled = {}
     # The small ones first: among them is what all workers have in common.
     for locked in reversed(look.chosen(staged, facts)):
-        room = _room(store, locked.sha256, room)
+        space = _space_left(store, locked.sha256, space)
         compiled[locked.sha256] = store.compile(
             locked.sha256, progress=lambda _: report("compile", 0, 1)
         )
@@ -34,14 +34,16 @@ def compile_wheels(arguments: Arguments, report: Report) -> None:
         venvs.add_compiled(venv, [compiled[locked.sha256] for locked in wheels])
 
 
-def _room(store: Store, sha256: str, room: int) -> int:
-    """What is left of `room` bytes, should the compiled files be as large as their sources."""
+def _space_left(store: Store, sha256: str, space: int) -> int:
+    """How many of `space` bytes stay free if the compiled files are as large as their sources."""
     stored = store.get(sha256)
     if stored is None or stored.compiled_here is not None:
-        return room
+        return space
     modules = (file.size for file in stored.files if file.path.endswith(".py"))
-    left = room - sum(modules)
+    left = space - sum(modules)
     if left < 0:
         where = str(store.root)
-        raise InstallFailed(Problem("DISK_FULL", "there is no room for compiled files", where))
+        raise InstallFailed(
+            Problem("DISK_FULL", "there is too little disk space for compiled files", where)
+        )
     return left

@@ -114,7 +114,7 @@ class Forked:
 
 
 class ForkClient:
-    """Starts the fork server when it is first wanted, and anew when it has ended. `close` it."""
+    """Starts the fork server when it is first needed, and again when it has ended. `close` it."""
 
     def __init__(self, module: str, on_crowded: Callable[[], None] = lambda: None) -> None:
         """`module` is run as a program with this process's id and the descriptor of its end of the

@@ -166,7 +166,7 @@ class _Children:
         self._poll.unregister(descriptor)
         child = self._running.pop(descriptor)
         _, status = os.waitpid(child.pid, 0)
-        with contextlib.suppress(BrokenPipeError):  # nobody wants to know
+        with contextlib.suppress(BrokenPipeError):  # no process reads it any more
             os.write(child.status, str(os.waitstatus_to_exitcode(status)).encode())
         os.close(child.status)
         os.close(descriptor)

@@ -33,7 +33,8 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
 
     Afterwards, whatever a starting daemon needs to make them again is safe on disk. Raises
     `InstallFailed` (DISK_FULL, STORE_DAMAGED, …) and `PayloadRefused`, also when it is not trusted
-    any more, or others were promised the memory that it needs; without `room`, nobody asks.
+    any more, or when the memory that it needs is reserved for other payloads, which is not checked
+    without `headroom`.
     """
     folder, root = Path(arguments["folder"]), Path(arguments["venvs"])
     by_pip = arguments["method"] == "pip"
@@ -41,7 +42,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     grant = chain.grant_of_kept(arguments, folder, staged.manifest, staged.goals)
     facts = look.facts_of(arguments)
     requires = staged.manifest.requires
-    if arguments["room"] is not None:
+    if arguments["headroom"] is not None:
         have = look.memory_for(arguments, facts)
         look.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
     root.mkdir(parents=True, exist_ok=True)

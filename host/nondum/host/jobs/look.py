@@ -170,10 +170,10 @@ def facts_of(arguments: Arguments) -> HostFacts:
 
 def memory_for(arguments: Arguments, facts: HostFacts) -> Memory:
     """This host's memory for a payload: with that of a release which it takes over from, and less
-    what others were promised."""
-    room = arguments["room"]
-    have = replace(facts.memory, promised=Promised.parse(room["promised"]))
-    return have.with_freed(room["freed_mb"], room["freed_gpu_mb"])
+    what is reserved for other payloads."""
+    headroom = arguments["headroom"]
+    have = replace(facts.memory, promised=Promised.parse(headroom["promised"]))
+    return have.with_freed(headroom["freed_mb"], headroom["freed_gpu_mb"])
 
 
 def chosen(staged: StagedPayload, facts: HostFacts) -> tuple[LockedWheel, ...]:

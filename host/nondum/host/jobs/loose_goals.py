@@ -1,4 +1,4 @@
-"""Goals that lie on a drive where nobody signs them: they are told of, and never read."""
+"""Goals that lie on a drive outside every signature: each is a problem, and none is read."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def hand_over(arguments: Arguments, report: Report) -> dict[str, Any]:
         raise PayloadRefused(Problem("HASH_MISMATCH", text, where=folder.name, fix=fix))
     listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
     wanted = _wanted(listed, arguments["wanted"])
-    _check_room(target, wanted, arguments["reserve_mb"])
+    _check_space(target, wanted, arguments["reserve_mb"])
     for entry in wanted:  # what a former attempt left
         (target / entry.path).unlink(missing_ok=True)
     drive.copy(
@@ -106,7 +106,7 @@ def _wanted(listed: Contents, hashes: Collection[str] | None) -> tuple[Entry, ..
     return tuple(entry for entry in listed.entries if entry.sha256 in hashes)
 
 
-def _check_room(target: Path, wanted: Collection[Entry], reserve_mb: int) -> None:
+def _check_space(target: Path, wanted: Collection[Entry], reserve_mb: int) -> None:
     target.mkdir(parents=True, exist_ok=True)
     need = sum(entry.size for entry in wanted)
     have = shutil.disk_usage(target).free - reserve_mb * _MB

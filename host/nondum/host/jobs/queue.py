@@ -1,4 +1,4 @@
-"""A queue: a few at a time, in the order in which they came, and whoever waits is told so."""
+"""A queue that lets a few callers in at a time, in order, and tells each its place in the queue."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Queue:
         self._waiting = 0
 
     async def enter(self, name: str, tell: TellAhead) -> None:
-        """Wait for a turn; whoever has one keeps it. `leave` ends it."""
+        """Wait for a turn; a caller that has one keeps it. `leave` ends it."""
         if name in self._inside:
             return
         waits = self._free.locked()
@@ -35,7 +35,7 @@ class Queue:
             tell(0)
 
     def leave(self, name: str) -> None:
-        """End a turn, and let the next in; who has none may say so too."""
+        """End a turn, and let the next caller in; does nothing for a caller that has no turn."""
         if name in self._inside:
             self._inside.discard(name)
             self._free.release()

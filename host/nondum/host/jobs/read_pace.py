@@ -1,6 +1,6 @@
-"""A drive that gives little by little is let go: two of them would hold up all others for ever.
+"""Refuses a drive that is read too slowly: two of them would hold up all other drives for ever.
 
-Such a one is never silent. Whoever copies from it asks for a pace that any stick has.
+Such a drive never runs into a read timeout. So each copy demands a pace that any stick has.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from nondum.wheelhouse.format.signatures import Grant
 from nondum.wheelhouse.trust.judging import EARLIEST
 
 RELEASE_JUMP = 1_000_000
-"""A release this far ahead of the newest known, of the clock and of its own date (releases may be
-build times) would lock out every honest one after it."""
+"""A release this far ahead of the newest known, of the clock and of the date that it states
+(releases may be build times) would lock out every honest one after it."""
 
 FARTHEST_DATE_S = 20 * 366 * 86400
 """A payload that says that it was built later than this after the clock's floor is not believed:

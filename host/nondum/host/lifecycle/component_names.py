@@ -52,7 +52,7 @@ def as_called(
     for other in state.components.values():
         if other.payload_id != payload_id:
             others.setdefault(other.description.name, set()).add(words_of(other.description))
-    given = given_names.plugins_of_others(state.names, payload_id)
+    given = given_names.plugins_of_other_payloads(state.names, payload_id)
     called = {}
     for own in {description.name for description in said.values()}:
         words = {words_of(one) for one in said.values() if one.name == own}
@@ -67,12 +67,12 @@ def remembering(
     before = state.names.get(payload.payload_id, NO_NAMES)
     plugins = {c.distribution: c.description.name for c in components}
     now = GivenNames(
-        _others({**before.components, **payload.names}), _others({**before.plugins, **plugins})
+        _renamed({**before.components, **payload.names}), _renamed({**before.plugins, **plugins})
     )
     if now == NO_NAMES:
         return {id: one for id, one in state.names.items() if id != payload.payload_id}
     return {**state.names, payload.payload_id: now}
 
 
-def _others(names: Mapping[str, str]) -> dict[str, str]:
+def _renamed(names: Mapping[str, str]) -> dict[str, str]:
     return {own: name for own, name in names.items() if name != own}

@@ -1,4 +1,4 @@
-"""Who is at fault when daemons die: what they were at is counted, and after a while left alone.
+"""Crash attribution: counts what daemons were at when they died, and leaves it alone in the end.
 
 A daemon commits what it is going to do before it does it, so a daemon that starts finds what the
 last one was at. One that ended because it was told to counts for nothing.
@@ -32,7 +32,7 @@ from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
 ATTEMPTS = 5
-"""So many daemons in a row may die at the same drive or payload; the next one leaves it alone."""
+"""Daemons in a row that may die at the same drive or payload; the next one leaves it alone."""
 
 ON_TRIAL = 1000
 """The count of what was left alone and is on its one trial. The next death leaves it alone until a
@@ -49,7 +49,7 @@ _BEGUN = frozenset(
 def subject_of(drive: DriveRecord) -> str:
     """What a drive is counted by; a payload is by its key.
 
-    The kernel numbers drives anew when the machine starts, so what they say of themselves counts,
+    The kernel numbers drives again when the machine starts, so what they say of themselves counts,
     where they do. A drive that says another thing each time is counted until the next start.
     """
     return f"{drive.kind}:{drive.mark or drive.id}"

@@ -22,12 +22,12 @@ from nondum.sdk.errors import Problem
 
 _AT_WORK = releases.STARTING | {Step.ACTIVE}
 _GONE = {"placed": "the host that handed it over ended that, or is gone"}
-"""What is told of payloads whose last drive is gone, for kinds that nobody pulls."""
+"""What is told of payloads whose last drive is gone, for kinds that no person pulls."""
 
 
 def on_drive_inserted(turn: Turn, event: DriveInserted) -> None:
-    """Read it, unless it is not to be. One that was there before the daemon's restart, or was
-    written anew where it is, is read again."""
+    """Read a drive, unless it is left alone. A drive that was there before the daemon's restart, or
+    was written again in place, is read again."""
     turn.events.append(event)
     drive = DriveRecord(
         id=event.drive,
@@ -63,7 +63,7 @@ def on_drive_removed(turn: Turn, event: DriveRemoved) -> None:
 
 def on_drive_read(turn: Turn, event: DriveRead) -> None:
     """Withdraw what the drive carried before and does not carry any more. A release in whose place
-    another one lies goes on until that is in force."""
+    another one lies goes on until that is active."""
     drive = turn.state.drives.get(event.drive)
     if drive is None:
         return
@@ -120,7 +120,7 @@ def lose_source(
 
 def drop_rewritten(turn: Turn, found: PayloadFound) -> None:
     """Withdraw what lay where a payload was found, unless it is at work: that goes on until the
-    payload in its place is in force."""
+    payload in its place is active."""
     for payload in _on(turn, found.drive):
         if payload.sources[found.drive] == found.folder and payload.step not in _AT_WORK:
             reason = "it was built again in its place"
@@ -128,8 +128,8 @@ def drop_rewritten(turn: Turn, found: PayloadFound) -> None:
 
 
 def drop_replaced(turn: Turn, payload: PayloadRecord) -> None:
-    """Withdraw the releases in whose place on its drive a payload lies that is in force now."""
-    for other in releases.others(turn.state, payload):
+    """Withdraw the releases in whose place on its drive a payload lies that is active now."""
+    for other in releases.other_releases(turn.state, payload):
         for drive, folder in other.sources.items():
             if payload.sources.get(drive) == folder:
                 current = turn.state.payloads[other.key]
@@ -156,7 +156,7 @@ def read(turn: Turn, drive: DriveRecord) -> None:
 def copy_of(payload: PayloadRecord, state: HostState) -> CopyPayload:
     """Copy a payload from its first source."""
     drive, folder = next(iter(payload.sources.items()))
-    old = releases.in_force(state, payload)
+    old = releases.active_release(state, payload)
     return CopyPayload(payload.key, drive, folder, payload.digest, old.key if old else "")
 
 

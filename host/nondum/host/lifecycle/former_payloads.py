@@ -9,7 +9,7 @@ from nondum.host.core.records import ComponentRecord, FormerPayload, PayloadReco
 from nondum.sdk.description import PluginDescription
 
 PAYLOADS_LIMIT = 200
-"""So many are remembered."""
+"""Payloads that are remembered, at most."""
 SIZE_LIMIT = 4 * 1024**2
 """What they said of themselves is together no longer than this, as JSON."""
 
@@ -58,16 +58,16 @@ def _former(
 def _within_limits(
     former: Mapping[str, FormerPayload], new: list[FormerPayload]
 ) -> dict[str, FormerPayload]:
-    """As many of the last as there is room for; one for which there is none costs no others.
+    """As many of the last as the limits allow; one that is too large displaces no others.
 
-    Who left last comes last: clocks jump, and say nothing of that.
+    The payload that left last comes last: clocks jump, and do not show the order.
     """
     gone = {one.key for one in new}
     ordered = [*(one for key, one in former.items() if key not in gone), *new]
     kept: list[FormerPayload] = []
-    room = SIZE_LIMIT
+    left = SIZE_LIMIT
     for payload in reversed(ordered):
-        if payload.size <= room and len(kept) < PAYLOADS_LIMIT:
+        if payload.size <= left and len(kept) < PAYLOADS_LIMIT:
             kept.append(payload)
-            room -= payload.size
+            left -= payload.size
     return {one.key: one for one in reversed(kept)}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from nondum.host.core.records import DeviceRecord, KnownDevice
 
 MOST = 200
-"""So many are remembered; beyond them those that were seen last longest ago are forgotten."""
+"""Devices that are remembered, at most; beyond them the least recently seen are forgotten."""
 
 
 def seen(

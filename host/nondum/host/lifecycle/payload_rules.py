@@ -120,7 +120,7 @@ def on_payload_verified(turn: Turn, event: PayloadVerified) -> None:
 
 
 def on_wheels_stored(turn: Turn, event: WheelsStored) -> None:
-    """Bring it to life, unless another release of it is in force or comes first."""
+    """Bring it to life, unless another release of it is active or comes first."""
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.STAGED:
         return
@@ -160,7 +160,7 @@ def on_payload_tried(turn: Turn, event: RetryAsked) -> None:
 
 
 def on_rollback_asked(turn: Turn, event: RollbackAsked) -> None:
-    """Go back to an earlier release; one that was refused for being older is read anew."""
+    """Go back to an earlier release; one that was refused for being older is read again."""
     if releases.on_rollback_asked(turn, event):
         on_payload_step(turn, event)
 
@@ -226,11 +226,11 @@ def _told(payload: PayloadRecord, event: Event) -> PayloadRecord:
 
 
 def on_trust_changed(turn: Turn, event: TrustChanged) -> None:
-    """Ask anew of all payloads that are here whether they are trusted."""
+    """Check again whether the payloads that are here are trusted."""
     turn.events.append(event)
     turn.effects.append(JudgePayloads(kept(turn.state)))
     turn.pending.extend(
-        RetryAsked(payload.key, "whom this host trusts has changed")
+        RetryAsked(payload.key, "the trust of this host has changed")
         for payload in turn.state.payloads.values()
         if payload.step is Step.REFUSED and retry_causes.is_untrusted(payload.problems)
     )
@@ -267,7 +267,7 @@ def effect_for(
     if issubclass(kind, ClearPayload | RestPayload | SuspendPayload):
         return kind(payload.key, payload.components)
     if issubclass(kind, StoreWheels | ProbeComponents | ActivatePayload):
-        old = releases.in_force(state, payload)
+        old = releases.active_release(state, payload)
         beside = old.key if old else ""
         if issubclass(kind, ActivatePayload):
             return kind(payload.key, beside)
@@ -294,7 +294,7 @@ def _entering(
     """The components with their ranks. Those of a release that it takes over from are withdrawn,
     and leave them their ranks and devices."""
     new = event.components
-    old = releases.in_force(turn.state, payload)
+    old = releases.active_release(turn.state, payload)
     if old is not None:
         before = [c for c in turn.state.components.values() if c.payload == old.key]
         turn.put_payload(replace(payload, was=old.release))

@@ -27,7 +27,7 @@ def recover(
     safety: Safety = Safety.OFF,
     why: str = "",
 ) -> Outcome:
-    """Send every payload forward or back. Devices and drives are told anew by their sources.
+    """Send every payload forward or back. The sources report devices and drives again.
 
     `missing` are keys of payloads whose folders are not there any more; `why` it is safe mode.
     """

@@ -1,7 +1,7 @@
-"""Which release of a payload is in force: the highest that is here and healthy, unless a person
-went back to an earlier one. Releases of one payload have one id, whatever fleets they are for.
+"""Which release of a payload is active: the highest that is here and healthy, unless a person went
+back to an earlier one. Releases of one payload have one id, whatever fleets they are for.
 
-A newer release is brought up beside the one in force and takes over in one commit; the others wait,
+A newer release is brought up beside the active one and takes over in one commit; the others wait,
 superseded, and come back when it goes or fails. One release of a payload is brought up at a time.
 """
 
@@ -34,7 +34,7 @@ STARTING = frozenset({Step.STORED, Step.PROBED})
 _INSTALLED = STARTING | {Step.ACTIVE, Step.SUPERSEDED}
 
 
-def others(state: HostState, payload: PayloadRecord) -> Iterator[PayloadRecord]:
+def other_releases(state: HostState, payload: PayloadRecord) -> Iterator[PayloadRecord]:
     """The other releases of a payload that are here, at whatever step."""
     return (
         other
@@ -43,13 +43,13 @@ def others(state: HostState, payload: PayloadRecord) -> Iterator[PayloadRecord]:
     )
 
 
-def in_force(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:
+def active_release(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:
     """The other release of a payload that is active, if one is."""
-    return next((o for o in others(state, payload) if o.step is Step.ACTIVE), None)
+    return next((o for o in other_releases(state, payload) if o.step is Step.ACTIVE), None)
 
 
-def standing(state: HostState, payload: PayloadRecord) -> tuple[int, bool]:
-    """What releases are ordered by: the number, but for one that a person went back to."""
+def precedence(state: HostState, payload: PayloadRecord) -> tuple[int, bool]:
+    """The order of releases: by number, but for one that a person went back to."""
     back = state.rollbacks.get(payload.payload_id)
     if back is not None and back.digest == payload.digest:
         return back.below, True
@@ -57,25 +57,27 @@ def standing(state: HostState, payload: PayloadRecord) -> tuple[int, bool]:
 
 
 def waits_behind(state: HostState, payload: PayloadRecord) -> PayloadRecord | None:
-    """The release that an installed one has to wait for: one that is being brought up, or is in
-    force and stands higher."""
-    for other in others(state, payload):
+    """The release that an installed one has to wait for: one that is being brought up, or is
+    active and takes precedence."""
+    for other in other_releases(state, payload):
         if other.step in STARTING:
             return other
-        is_higher = standing(state, other) > standing(state, payload)
+        is_higher = precedence(state, other) > precedence(state, payload)
         if other.step is Step.ACTIVE and is_higher:
             return other
     return None
 
 
 def waits_for_recovery(found: HostState, payload: PayloadRecord) -> bool:
-    """Whether a starting daemon brings up another release first: the one that was in force, or the
+    """Whether a starting daemon brings up another release first: the one that was active, or the
     highest."""
 
     def place(one: PayloadRecord) -> tuple[bool, tuple[int, bool]]:
-        return one.step is Step.ACTIVE, standing(found, one)
+        return one.step is Step.ACTIVE, precedence(found, one)
 
-    ahead = (o for o in others(found, payload) if o.step in STARTING or o.step is Step.ACTIVE)
+    ahead = (
+        o for o in other_releases(found, payload) if o.step in STARTING or o.step is Step.ACTIVE
+    )
     return any(place(other) > place(payload) for other in ahead)
 
 
@@ -98,21 +100,21 @@ def can_go_back_to(state: HostState, payload: PayloadRecord) -> PayloadRecord | 
     """The newest release before one, of those that wait or are refused only for being older."""
     earlier = [
         other
-        for other in others(state, payload)
+        for other in other_releases(state, payload)
         if other.release < payload.release and (other.step is Step.SUPERSEDED or _is_older(other))
     ]
     return max(earlier, key=lambda o: (o.release, o.step is Step.SUPERSEDED), default=None)
 
 
 def settle(turn: Turn) -> Iterable[PayloadResumed]:
-    """Call for releases that wait and have nobody to wait for any more: the highest of each payload
-    whose others are not being brought up."""
+    """Resume releases that need not wait any longer: the highest of each payload none of whose
+    releases is being brought up."""
     groups: dict[str, list[PayloadRecord]] = {}
     for payload in turn.state.payloads.values():
         if payload.step in _INSTALLED:
             groups.setdefault(payload.payload_id, []).append(payload)
     for group in groups.values():
-        best = max(group, key=lambda payload: standing(turn.state, payload))
+        best = max(group, key=lambda payload: precedence(turn.state, payload))
         is_starting = any(payload.step in STARTING for payload in group)
         if best.step is Step.SUPERSEDED and not is_starting:
             yield PayloadResumed(best.key, _why_resumed(turn.state, best))
@@ -125,7 +127,7 @@ def waiting(payload: PayloadRecord, other: PayloadRecord) -> PayloadSuperseded:
 
 
 def superseded(old: PayloadRecord, new: PayloadRecord) -> PayloadSuperseded:
-    """What becomes of the release in force as another one takes over."""
+    """What becomes of the active release as another one takes over."""
     reason = f"{new.version} (release {new.release}) took over"
     return PayloadSuperseded(old.key, new.key, reason)
 
@@ -146,12 +148,12 @@ def inherited(
 
 
 def on_beside_refused(turn: Turn, event: BesideRefused) -> None:
-    """Stop the release in force first; it comes back should the other one fail."""
+    """Stop the active release first; it comes back if the other one fails."""
     payload = turn.state.payloads.get(event.payload)
     if payload is None or payload.step is not Step.STORED:
         return
     turn.events.append(event)
-    old = in_force(turn.state, payload)
+    old = active_release(turn.state, payload)
     if old is not None:
         turn.pending.append(PayloadSuperseded(old.key, payload.key, event.reason))
     after = old.key if old else ""
@@ -159,12 +161,12 @@ def on_beside_refused(turn: Turn, event: BesideRefused) -> None:
 
 
 def on_rollback_asked(turn: Turn, event: RollbackAsked) -> bool:
-    """Put an earlier release before all that are here. Says whether it must be read anew, since it
+    """Put an earlier release before all that are here. Says whether it must be read again, since it
     was refused."""
     payload = turn.state.payloads.get(event.payload)
     if payload is None or not (payload.step is Step.SUPERSEDED or _is_older(payload)):
         return False
-    installed = [o.release for o in others(turn.state, payload) if o.step in _INSTALLED]
+    installed = [o.release for o in other_releases(turn.state, payload) if o.step in _INSTALLED]
     below = max(payload.release, event.from_release, *installed)
     back = Rollback(payload.digest, payload.release, below)
     turn.change(rollbacks={**turn.state.rollbacks, payload.payload_id: back})
@@ -182,7 +184,7 @@ def on_retry_asked(turn: Turn, payload: PayloadRecord, event: RetryAsked) -> Non
 
 
 def on_found(turn: Turn, found: PayloadFound) -> None:
-    """A release that is plugged in anew overrules an earlier going back from it; one that is still
+    """A release that is plugged in again overrules an earlier going back from it; one that is still
     newer comes before both."""
     back = turn.state.rollbacks.get(found.payload_id)
     if back is not None and back.release < found.release <= back.below:
@@ -211,9 +213,9 @@ def is_overruled(state: HostState, found: PayloadFound) -> bool:
 def gives_way(
     state: HostState, payload: PayloadRecord, problems: tuple[Problem, ...]
 ) -> Iterator[PayloadFailed]:
-    """What becomes of a release in force whose worker was given up: with another one to come back,
+    """What becomes of an active release whose worker was given up: with another one to come back,
     it fails."""
-    if any(other.step is Step.SUPERSEDED for other in others(state, payload)):
+    if any(other.step is Step.SUPERSEDED for other in other_releases(state, payload)):
         yield PayloadFailed(payload.key, problems)
 
 
@@ -222,8 +224,8 @@ def _is_older(payload: PayloadRecord) -> bool:
 
 
 def _why_resumed(state: HostState, payload: PayloadRecord) -> str:
-    if standing(state, payload)[1]:
+    if precedence(state, payload)[1]:
         return "a person goes back to it"
-    if in_force(state, payload) is not None:
-        return "it is newer than the one in force"
-    return "the one that was in force is not any more"
+    if active_release(state, payload) is not None:
+        return "it is newer than the active one"
+    return "the release that was active has stopped"

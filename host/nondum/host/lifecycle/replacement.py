@@ -29,10 +29,10 @@ def problems(state: HostState, payload: PayloadRecord, index: Index) -> tuple[Pr
 
     Of one that waits, only the name is known: then the new release has to be sound by itself.
     """
-    old = releases.in_force(state, payload)
+    old = releases.active_release(state, payload)
     if old is not None:
         return _losses(state, old, index)
-    if any(other.step is Step.SUPERSEDED for other in releases.others(state, payload)):
+    if any(other.step is Step.SUPERSEDED for other in releases.other_releases(state, payload)):
         return vocabulary_check.judge(index).problems
     return ()
 

@@ -72,7 +72,7 @@ class Amounts:
     disk_mb: int
     """Free disk, less what is reserved."""
     memory_mb: int
-    """Memory that nobody was promised."""
+    """Memory that is promised to no payload."""
     gpu_memory_mb: int
     clock_s: float
     """Seconds from the start of the machine's steady clock to the epoch: another once the clock has
@@ -124,9 +124,9 @@ def waits(snapshot: Snapshot, elsewhere: Set[str] = frozenset()) -> Iterator[Pay
 def is_passing(problems: Iterable[Problem]) -> bool:
     """Whether all causes of a refusal can go away.
 
-    >>> is_passing([Problem("DISK_FULL", "no room")])
+    >>> is_passing([Problem("DISK_FULL", "no space")])
     True
-    >>> is_passing([Problem("DISK_FULL", "no room"), Problem("WHEEL_RECORD", "wrong")])
+    >>> is_passing([Problem("DISK_FULL", "no space"), Problem("WHEEL_RECORD", "wrong")])
     False
     """
     codes = {problem.code for problem in problems}

@@ -17,17 +17,17 @@ from nondum.sdk.errors import Problem
 
 CODE = "SAFE_MODE"
 DEATHS = 8
-"""After so many daemons in a row that died soon, the next one leaves guests alone. More than
-`tries.ATTEMPTS`: one bad drive is no reason for it."""
+"""Daemons in a row that died soon, after which the next one leaves guests alone. More than
+`crash_attribution.ATTEMPTS`: one bad drive is no reason for it."""
 MORE_DEATHS = 12
-"""After so many, also what is installed for good."""
+"""The same, after which the next one also leaves alone what is installed for good."""
 KERNEL_WORD = "nondum.safe"
 
 _ORDER = (Safety.OFF, Safety.INITIAL, Safety.NOTHING)
 
 
 def after_deaths(deaths: int) -> Safety:
-    """What so many daemons in a row call for.
+    """The safe mode after a number of daemons in a row that died soon.
 
     >>> [after_deaths(n).name for n in (0, 7, 8, 12)]
     ['OFF', 'OFF', 'INITIAL', 'NOTHING']
@@ -59,8 +59,8 @@ def strictest(wanted: Iterable[Safety]) -> Safety:
 
 def problem(safety: Safety, where: str = "", why: str = "") -> Problem:
     """What is told of the host, of a drive or of a payload."""
-    whom = "payloads of drives and other hosts" if safety is Safety.INITIAL else "all payloads"
-    told = f"{whom} are left alone{f': {why}' if why else ''}"
+    guests = "payloads of drives and other hosts" if safety is Safety.INITIAL else "all payloads"
+    told = f"{guests} are left alone{f': {why}' if why else ''}"
     return Problem(CODE, told, where=where)
 
 

@@ -20,7 +20,7 @@ def on_left(turn: Turn, event: SafeModeLeft) -> None:
         if any(found.code == CODE for found in drive.problems):
             drive_rules.read(turn, drive)
     waiting = [payload for payload in turn.state.payloads.values() if waits(payload)]
-    waiting.sort(key=lambda payload: releases.standing(turn.state, payload), reverse=True)
+    waiting.sort(key=lambda payload: releases.precedence(turn.state, payload), reverse=True)
     turn.pending.extend(RetryAsked(payload.key) for payload in waiting)
-    # Whom this host trusts may have changed meanwhile: of what waits, nobody asked.
+    # The trust of this host may have changed meanwhile; nothing has checked what waits.
     turn.effects.append(JudgePayloads(tuple(payload.key for payload in waiting)))

@@ -1,4 +1,4 @@
-"""A host that nobody looks after tries again what daemons died of, after an hour: its one trial."""
+"""Automatic retry: after an hour, an unattended host tries once more what daemons died of."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.crash_loop import CrashCounter
 
 AFTER_S = 3600.0
-"""So long a daemon lives before it tries."""
+"""The age of a daemon at which it tries."""
 APART_S = 12 * STEADY_S
 """Between two trials: if a daemon dies, it is known of which."""
 
@@ -21,7 +21,7 @@ async def hold(snapshot: Callable[[], Snapshot], counter: CrashCounter, emit: Em
     tried, one after the other, until cancelled. By the time of the event loop."""
     await asyncio.sleep(AFTER_S)
     host = snapshot().host
-    if snapshot().safety is not Safety.OFF and await counter.tries_again():
+    if snapshot().safety is not Safety.OFF and await counter.may_leave_safe_mode():
         emit(SafeModeLeft(host, "it has lasted for an hour"))
         await counter.outlive()
     while True:

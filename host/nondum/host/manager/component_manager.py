@@ -38,13 +38,13 @@ from nondum.host.sources.drives.source import DriveSource
 COMMIT_AGAIN_S = 0.5
 """After a commit failed: on a full disk, say."""
 COMMIT_TRIES = 1
-"""So many more, before the host goes on with what cannot be written down."""
+"""Further attempts, before the host goes on with what cannot be written down."""
 
 log = logging.getLogger(__name__)
 
 
 class Executes(Protocol):
-    """Whoever carries effects out and reports by events."""
+    """Carries effects out and reports by events."""
 
     async def rebuild(self, state: HostState, at: Moment) -> HostState:
         """The state, with what is installed for good and is not in it: its catalogue was lost."""
@@ -59,7 +59,7 @@ class Executes(Protocol):
         ...
 
     def adopt(self, state: HostState) -> None:
-        """Take note of what was committed, before anybody is told; never blocks, never raises."""
+        """Note what was committed, before listeners are told; never blocks, never raises."""
         ...
 
     def start(self, effect: Effect) -> None:

@@ -1,5 +1,5 @@
-"""How many daemons in a row died soon after they started: kept in a file of its own, for the
-catalogue may be what they die of."""
+"""Crash-loop counter: how many daemons in a row died soon after they started. It is kept in a
+separate file, since the catalogue may be what they die of."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nondum.host.lifecycle import safe_mode
 from nondum.wheelhouse.store import disk
 
 SOON_S = 60.0
-"""Whoever lives so long once it serves has not died soon."""
+"""A daemon that lives this long once it serves has not died soon."""
 COMMAND_LINE = Path("/proc/cmdline")
 
 log = logging.getLogger(__name__)
@@ -68,9 +68,9 @@ class CrashCounter:
         died = "1 daemon" if deaths == 1 else f"{deaths} daemons in a row"
         return (f"{died} died soon after the start; after {safe_mode.DEATHS} comes safe mode",)
 
-    async def tries_again(self) -> bool:
-        """Whether this daemon, which has lasted, may leave safe mode: no person wants it there. If
-        it dies of that before it has outlived it, the next one is in safe mode again."""
+    async def may_leave_safe_mode(self) -> bool:
+        """Whether this daemon, which has lasted, may leave safe mode: no person asked for that. If
+        it dies of leaving before `outlive` is done, the next one is in safe mode again."""
         if self._is_asked:
             return False
         await in_thread(self._write, safe_mode.DEATHS)
@@ -96,7 +96,7 @@ class CrashCounter:
         """A host whose disk is full or damaged goes on; it is only not counted."""
         try:
             if deaths:
-                # Also whoever takes the machine down at once is to be counted.
+                # A daemon that takes the machine down at once is counted, too.
                 disk.write(self._deaths, b"%d\n" % deaths)
             else:
                 self._deaths.unlink(missing_ok=True)

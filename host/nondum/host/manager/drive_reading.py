@@ -39,8 +39,8 @@ of one that does not, so these are more than there are processors to keep busy."
 
 
 @contextlib.contextmanager
-def telling_stalls(drive: str, stall_s: float) -> Iterator[None]:
-    """Have a child that hears nothing of its drive told as the drive's fault, not the child's.
+def stalls_as_drive_gone(drive: str, stall_s: float) -> Iterator[None]:
+    """Report a child whose drive does not answer as an error of the drive, not of the child.
 
     Raises `DriveGone` (DRIVE_STALLED).
     """
@@ -123,7 +123,7 @@ class DriveReading:
         """What is on a drive. Its child stays as long as there is something to copy."""
         found: dict[str, Any] = {"payloads": ()}
         try:
-            with telling_stalls(drive, self._look_s):
+            with stalls_as_drive_gone(drive, self._look_s):
                 found = await self._children.run(
                     "look", arguments, owner=drive, stall_s=self._look_s
                 )

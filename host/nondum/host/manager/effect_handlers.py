@@ -38,7 +38,7 @@ from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import DriveGone, NondumError, Problem
 from nondum.wheelhouse.store import disk
 
-_Hand = Callable[[Any], Awaitable[tuple[Event, ...]]]
+_Handler = Callable[[Any], Awaitable[tuple[Event, ...]]]
 
 _INSTEAD = (
     effects.CopyPayload,
@@ -53,7 +53,7 @@ log = logging.getLogger(__name__)
 
 
 class Executor:
-    """The component manager's hands. `close` it, before the workers."""
+    """Runs the effect handlers of the component manager. `close` it, before the workers."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class Executor:
         self.installation = Installation(
             host, folders, workers, self.children, emit, options, self.trust
         )
-        self._hands: Mapping[type[Effect], _Hand] = {
+        self._handlers: Mapping[type[Effect], _Handler] = {
             effects.JudgePayloads: self.trust.judged,
             effects.ReadDrive: self._drives.read,
             effects.ReleaseDrive: self._drives.release,
@@ -113,9 +113,9 @@ class Executor:
             self.start(effects.JudgePayloads(payloads))
 
     async def judged_by(self, beside: str) -> Mapping[str, Any]:
-        """What a payload that is not here yet is judged by now, for child processes: whose are let
-        in, and what memory there is for it, `beside` a release of it or ""."""
-        return {**self.trust.arguments, "room": await self.installation.room(beside)}
+        """What child processes judge a payload by that is not here yet: the trust of this host, and
+        the memory that there is for it, `beside` a release of it or ""."""
+        return {**self.trust.arguments, "headroom": await self.installation.headroom(beside)}
 
     def adopt(self, state: HostState) -> None:
         """Have the workers stand for components that the catalogue says."""
@@ -137,7 +137,7 @@ class Executor:
     async def _carry_out(self, effect: Effect) -> None:
         try:
             with self._urgent(effect):
-                reported = await self._hands[type(effect)](effect)
+                reported = await self._handlers[type(effect)](effect)
         except NondumError as error:
             reported = _failure(effect, error)
         except Exception as error:
@@ -180,7 +180,7 @@ class Executor:
 
 
 def _translated(effect: Effect, error: Exception) -> NondumError:
-    """What is told of an error that nobody below has put into words."""
+    """The error to report for an exception that no layer below has translated."""
     what = type(effect).__name__
     if isinstance(error, OSError):
         return disk.failed(error, what, Path(error.filename or ""))

@@ -17,7 +17,7 @@ _PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What a payload's manifest says of the room that it takes."""
+    """The memory that a payload needs, as its manifest says."""
 
     payload_id: str = ""
     memory_mb: int = 0

@@ -117,7 +117,7 @@ def _drop_older(state: HostState, payload: PayloadRecord, bus: Bus) -> None:
     """Keep of the releases that were installed only the new one and the one before it."""
     if payload.step is not Step.ACTIVE:
         return
-    for other in releases.others(state, payload):
+    for other in releases.other_releases(state, payload):
         if other.release not in (payload.was, payload.release) and other.release < payload.release:
             for drive in _installed_as(state, other):
                 bus.emit(DriveRemoved(drive))

@@ -38,7 +38,7 @@ from nondum.host.jobs.prepared import Prepared
 from nondum.host.jobs.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.retry_causes import Amounts
-from nondum.host.manager.drive_reading import LOOK_S, telling_stalls
+from nondum.host.manager.drive_reading import LOOK_S, stalls_as_drive_gone
 from nondum.host.manager.headroom import Needs
 from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
@@ -153,9 +153,9 @@ class Installation:
             folder=str(effect.folder),
             digest=effect.digest,
             staging=str(staging),
-            room=await self._reservations.room(effect.payload, effect.beside),
+            headroom=await self._reservations.headroom(effect.payload, effect.beside),
         )
-        with telling_stalls(effect.drive, COPY_SILENCE_S):
+        with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
             copied = await self._run("copy", effect.payload, arguments, COPY_SILENCE_S)
         return (PayloadCopied(effect.payload, copied["copied"], copied["known"]),)
 
@@ -192,9 +192,9 @@ class Installation:
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
         specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
-        standing = Role.BESIDE if effect.beside else Role.IN_FORCE
+        role = Role.BESIDE if effect.beside else Role.ACTIVE
         started = await asyncio.gather(
-            *(self._workers.start(spec, standing) for spec in specs), return_exceptions=True
+            *(self._workers.start(spec, role) for spec in specs), return_exceptions=True
         )
         failed = [error for error in started if isinstance(error, BaseException)]
         if failed:
@@ -275,14 +275,14 @@ class Installation:
         )
         return rows
 
-    async def room(self, beside: str) -> dict[str, Any]:
-        """What children are told of the memory that there is for a payload that is not here yet,
-        which may take over from a release of it."""
-        return await self._reservations.room("", beside)
+    async def headroom(self, beside: str) -> dict[str, Any]:
+        """The memory that there is for a payload that is not here yet, for children; it may take
+        over from a release of it."""
+        return await self._reservations.headroom("", beside)
 
     async def amounts(self) -> Amounts:
         """What there is for a payload that is not here yet."""
-        promised = Promised.parse((await self.room(""))["promised"])
+        promised = Promised.parse((await self.headroom(""))["promised"])
         disk_mb, memory = await in_thread(self._looked_at)
         gpu_mb = self._reservations.gpu_mb - promised.gpu_memory_mb
         left_mb = Memory(memory, promised=promised).left_mb()
@@ -302,10 +302,10 @@ class Installation:
         """
         arguments = self._arguments(python=str(base_interpreter()), **self._places(key))
         async with self._store:
-            room = None
+            headroom = None
             if admit_beside is not None:
-                room = await self._reservations.room(key, admit_beside)
-            told = await self._run("install", key, {**arguments, "room": room})
+                headroom = await self._reservations.headroom(key, admit_beside)
+            told = await self._run("install", key, {**arguments, "headroom": headroom})
             self._needs[key] = Needs.parse(told["needs"])
             self._reservations.make(key, self._needs[key])
             self._reservations.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
@@ -368,7 +368,7 @@ class Installation:
 
 
 def _move(staging: Path, lasting: Path) -> None:
-    """Rename a folder. Whoever says that its payload is stored sees to it that it is on disk."""
+    """Rename a folder. The caller syncs it to disk before it says that the payload is stored."""
     remove(lasting)
     disk.make_folder(lasting.parent)
     staging.rename(lasting)

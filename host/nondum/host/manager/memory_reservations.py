@@ -43,12 +43,12 @@ class MemoryReservations:
         """GPU memory that there is in all, as far as it was seen."""
         return self._gpu.total_mb if self._gpu is not None else 0
 
-    async def room(self, payload: str, beside: str) -> dict[str, Any]:
-        """What the jobs `copy` and `install` are told of memory: what others were promised, and
-        what the release leaves that would make room for it."""
+    async def headroom(self, payload: str, beside: str) -> dict[str, Any]:
+        """The memory that the jobs `copy` and `install` may count on: what other payloads were
+        promised, and what becomes free when the release `beside` stops."""
         used = await self._used_mb((*self._made, beside))
         return {
-            "promised": asdict(total(self._to_others(payload, beside), used)),
+            "promised": asdict(total(self._needs_of_all_but(payload, beside), used)),
             "freed_mb": used[beside],
             "freed_gpu_mb": self._made.get(beside, NOTHING).gpu_memory_mb,
         }
@@ -59,13 +59,13 @@ class MemoryReservations:
         That one's GPU memory stays its own, since it is not known how much it uses.
         """
         used = await self._used_mb((*self._made, beside))
-        promised = total(self._to_others(payload, beside), used)
+        promised = total(self._needs_of_all_but(payload, beside), used)
         old_gpu_mb = self._made.get(beside, NOTHING).gpu_memory_mb
         promised = replace(promised, gpu_memory_mb=promised.gpu_memory_mb + old_gpu_mb)
         have = Memory(free_memory_mb(), self._gpu, promised)
         return why_not_beside(self._made[payload], used[beside], have)
 
-    def _to_others(self, *payloads: str) -> dict[str, Needs]:
+    def _needs_of_all_but(self, *payloads: str) -> dict[str, Needs]:
         return {key: needs for key, needs in self._made.items() if key not in payloads}
 
     async def _used_mb(self, payloads: Iterable[str]) -> dict[str, int]:

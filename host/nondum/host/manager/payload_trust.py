@@ -1,4 +1,4 @@
-"""Whose payloads this host runs: the trust file in force, and how it changes.
+"""Payload trust: the active trust file, which says whose payloads this host runs, and its changes.
 
 What is slow, and all mathematics, is done by child processes: see `chain`. A change is told once it
 is on disk; every payload that is here is then judged again.
@@ -26,7 +26,7 @@ from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
 from nondum.host.trust import anchors, chain
 from nondum.host.trust.rules import Rules, parsed
-from nondum.host.trust.vouched import NOBODY, Vouched
+from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.sdk.errors import NondumError, Problem, TrustRefused
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.trust.judging import clock_floor
@@ -76,7 +76,7 @@ class PayloadTrust:
 
     @property
     def trust(self) -> Trust | None:
-        """The trust file in force; None: nobody is trusted."""
+        """The active trust file; None: no key is trusted."""
         return parsed(self._text) if self._text is not None else None
 
     @property
@@ -90,8 +90,8 @@ class PayloadTrust:
         """What every status says."""
         unsigned = (UnsignedAllowed.warning,) if self._allow_unsigned else ()
         is_closed = self._text is None and not self._allow_unsigned
-        nobody = "no payload is accepted: this host trusts nobody yet; see `nondum keys trust`"
-        return (*unsigned, *map(str, self._problems), *((nobody,) if is_closed else ()))
+        closed = "no payload is accepted: this host trusts no key yet; see `nondum keys trust`"
+        return (*unsigned, *map(str, self._problems), *((closed,) if is_closed else ()))
 
     async def open(self) -> tuple[Event, ...]:
         """Read and verify what is on disk. What is wrong with it is told by `warnings`."""
@@ -105,7 +105,7 @@ class PayloadTrust:
     async def reload(self) -> tuple[Event, ...]:
         """Read it again, since a person has changed the first file.
 
-        Raises `TrustRefused`, `InstallFailed`: then the trust in force stays.
+        Raises `TrustRefused`, `InstallFailed`: then the current trust stays.
         """
         async with self._changing:
             told, before = await self._loaded(), self._text
@@ -117,14 +117,14 @@ class PayloadTrust:
     async def offer(
         self, source: str, files: Sequence[SignedFile], flaws: Sequence[Problem] = ()
     ) -> tuple[Event, ...]:
-        """Take the files that follow the one in force, as `source` brought them; a host that trusts
-        nobody does not begin to for a drive's sake. What became of it; never raises."""
+        """Take the files that follow the active one, as `source` brought them, and return what
+        became of them; never raises. A host without a trust file takes none from a drive."""
         problems = tuple(flaws)
         async with self._changing:
             new = tuple(file for file in files if file.digest not in self._known)
             taken: tuple[Event, ...] = ()
             if new and self._text is None:
-                problems += (_nobody_vouches(),)
+                problems += (_no_anchor(),)
             elif new:
                 try:
                     told = await self._children.run("trust_extend", self._extension(new))
@@ -138,7 +138,7 @@ class PayloadTrust:
         return (*taken, TrustFileRefused(source, problems[:MOST_TOLD])) if problems else taken
 
     async def give(self, file: SignedFile) -> tuple[Event, ...]:
-        """Take the file that follows the one in force, from a person.
+        """Take the file that follows the active one, from a person.
 
         Raises `TrustRefused` with why it is not taken.
         """
@@ -149,10 +149,10 @@ class PayloadTrust:
         return events
 
     async def judged(self, effect: JudgePayloads) -> tuple[Event, ...]:
-        """Judge anew what is here, by the trust in force; what cannot be judged is not trusted."""
+        """Judge again what is here, by the active trust; what cannot be judged is not trusted."""
         try:
             found = await self._judged(effect.payloads)
-        except NondumError:  # one of them is at fault
+        except NondumError:  # one of them causes it
             found = {}
             for key in effect.payloads:
                 try:
@@ -169,7 +169,7 @@ class PayloadTrust:
 
     def vouched(self, payload: str) -> Vouched:
         """Who vouches for a payload, by its key."""
-        return self._vouched.get(payload, NOBODY)
+        return self._vouched.get(payload, UNVOUCHED)
 
     def row(self) -> dict[str, Any]:
         """What people's tools are shown."""
@@ -223,18 +223,18 @@ class PayloadTrust:
         return {"folder": str(self._folders.trust), "anchor": str(self._anchor)}
 
     def _extension(self, files: tuple[SignedFile, ...]) -> dict[str, Any]:
-        in_force = {"trust": self._text, "known": self._known}
-        return {**self._places(), **in_force, "offered": chain.packed(files)}
+        current = {"trust": self._text, "known": self._known}
+        return {**self._places(), **current, "offered": chain.packed(files)}
 
 
 def _problems(told: Mapping[str, Any]) -> tuple[Problem, ...]:
     return tuple(Problem(**problem) for problem in told["problems"])
 
 
-def _nobody_vouches() -> Problem:
+def _no_anchor() -> Problem:
     return Problem(
         "TRUST_UNANCHORED",
-        "there is a trust file on it, and this host trusts nobody yet who could vouch for it",
+        "there is a trust file on it, and this host trusts no key yet that could vouch for it",
         need="a first trust file, put here by a person",
         have="none",
         fix="compare the fingerprints of its roots with its owner's, then `nondum keys trust FILE`",

@@ -14,7 +14,7 @@ from nondum.sdk.errors import InstallFailed, Problem
 
 
 def target_of(state: HostState, payload_id: str) -> tuple[PayloadRecord, PayloadRecord]:
-    """The release in force of a payload, and the one before it.
+    """The active release of a payload, and the one before it.
 
     Raises `InstallFailed` (PAYLOAD_UNKNOWN, ROLLBACK_BUSY, ROLLBACK_NOTHING).
     """
@@ -22,22 +22,22 @@ def target_of(state: HostState, payload_id: str) -> tuple[PayloadRecord, Payload
     if not mine:
         known = {payload.payload_id for payload in state.payloads.values()}
         raise InstallFailed(unknown("payload", payload_id, known))
-    in_force = next((payload for payload in mine if payload.step is Step.ACTIVE), None)
-    if in_force is None or any(payload.step in releases.STARTING for payload in mine):
+    active = next((payload for payload in mine if payload.step is Step.ACTIVE), None)
+    if active is None or any(payload.step in releases.STARTING for payload in mine):
         raise InstallFailed(_busy(payload_id))
-    target = releases.can_go_back_to(state, in_force)
+    target = releases.can_go_back_to(state, active)
     if target is None:
-        raise InstallFailed(_nothing(in_force))
-    return in_force, target
+        raise InstallFailed(_nothing(active))
+    return active, target
 
 
 async def go_back(payload_id: str, catalogue: Catalogue, bus: Bus) -> PayloadRecord:
-    """Go back to the release before and wait until it is in force.
+    """Go back to the release before and wait until it is active.
 
     Raises `InstallFailed`: the reason why not, and then the newer one stays.
     """
-    in_force, target = target_of(catalogue.state, payload_id)
-    asked = RollbackAsked(target.key, target.release, in_force.release)
+    active, target = target_of(catalogue.state, payload_id)
+    asked = RollbackAsked(target.key, target.release, active.release)
     with Watch(catalogue, bus) as watch:
         bus.emit(asked)
         await watch.until(lambda state: _is_wanted(state, target) or None)
@@ -66,12 +66,12 @@ def _busy(payload_id: str) -> Problem:
     return Problem("ROLLBACK_BUSY", "it is just being brought up", where=payload_id, fix=fix)
 
 
-def _nothing(in_force: PayloadRecord) -> Problem:
+def _nothing(active: PayloadRecord) -> Problem:
     return Problem(
         "ROLLBACK_NOTHING",
         "there is no earlier release to go back to",
-        where=in_force.payload_id,
-        need=f"one before release {in_force.release}, plugged in or installed",
+        where=active.payload_id,
+        need=f"one before release {active.release}, plugged in or installed",
         have="none",
         fix="plug the earlier one in beside it (it is refused as ROLLBACK), and ask again",
     )

@@ -148,7 +148,7 @@ def make_private(folders: Folders) -> None:
 def let_pass(folders: Folders) -> None:
     """Let workers that are other users than this daemon reach their own code and scratch folders.
 
-    They, and others who know a path, may go through; nobody may list what is there. Blocks.
+    They, and others who know a path, may go through; they cannot list what is there. Blocks.
     """
     for folder in (folders.root, *folders.of_workers):
         folder.mkdir(exist_ok=True)

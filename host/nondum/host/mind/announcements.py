@@ -96,11 +96,11 @@ def recomposed(old: Composition | None, new: Composition) -> list[str]:
 
 
 def _contested(old: Composition | None, new: Composition) -> list[str]:
-    """Who has a device that others want too, and by what rule."""
+    """Which component has a device that other ones want too, and by what rule."""
     known = {c.id: c.devices for c in old.snapshot.components} if old else {}
     return [
         f"{component.id} has the device {claim.device}, which {' and '.join(claim.contested_by)} "
-        "would need too: it stays with whoever has it, and a free one goes to the first by name"
+        "would need too: it stays with that component; a free device goes to the first by name"
         for component in new.snapshot.components
         for claim in component.devices
         if claim.contested_by and claim not in known.get(component.id, ())

@@ -116,7 +116,7 @@ class Beliefs:
         return True
 
     def _may_say(self, event: FactKnown | FactForgotten) -> bool:
-        """Whether a component may have a say; stragglers and usurpers may not."""
+        """Whether a component may state a fact: it is here, and the host does not state it."""
         if event.component not in self._names:
             return False
         if event.predicate in HOST_PREDICATES:

@@ -115,7 +115,7 @@ def component_facts(
         facts[fact("on", name, host)] = f"{component} is plugged into {host}"
         if is_ready:
             facts[fact("ready", name)] = f"{component} is healthy and its devices are there"
-            facts[fact("idle", name)] = "nobody uses it"
+            facts[fact("idle", name)] = "nothing uses it"
         for output in unit.outputs:
             stream = object_name(host, component, output.name)
             facts[fact("output", name, stream)] = f"{component} declares it"
@@ -123,7 +123,7 @@ def component_facts(
                 why = f"{component} produces it from its start on"
                 facts[fact("from", stream, host)] = why
             else:
-                facts[fact("free", stream)] = "nobody uses it"
+                facts[fact("free", stream)] = "nothing uses it"
     return facts
 
 

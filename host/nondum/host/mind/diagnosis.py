@@ -132,7 +132,7 @@ def _in_the_way(
 
 
 def _used_to_supply(gone: Iterable[Seen]) -> tuple[Problem, ...]:
-    """One problem for all of them; none where nobody did."""
+    """One problem for all of them; none where there is none."""
     known = sorted(gone, key=lambda seen: seen.contribution.component)
     if not known:
         return ()

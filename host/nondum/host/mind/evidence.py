@@ -67,7 +67,7 @@ def explained(asked: str, beliefs: Beliefs, composition: Composition | None) -> 
     `age_s`; `instead`: the other value of a functional predicate; `absent`: objects that it waits
     for; `assumed_by`, `denied_by`: actions whose effects would make it true or false;
     `observed_by`: conditions that keep it; `hint`: what is wrong with the words of it. Raises
-    `FragmentRefused` (E-SYNTAX) for what is not one fact.
+    `FragmentRefused` (PDDL_SYNTAX) for what is not one fact.
     """
     text = _named(asked, beliefs.snapshot.host)
     found = beliefs.world.evidence(text)
@@ -130,7 +130,7 @@ def _age_s(at_s: float | None, beliefs: Beliefs) -> float | None:
 def _named(asked: str, host: str) -> str:
     """A fact as a person writes it, with or without parentheses, as the world model does.
 
-    Of one that is said not to hold, the fact. Raises `FragmentRefused` (E-SYNTAX).
+    Of one that is said not to hold, the fact. Raises `FragmentRefused` (PDDL_SYNTAX).
     """
     words = asked.lower().split()
     if words and words[0].startswith("("):
@@ -139,7 +139,7 @@ def _named(asked: str, host: str) -> str:
                 words = [atom.predicate, *(term.name for term in atom.terms)]
             case other:
                 message = "expected one fact, such as (ready panther__eye__camera)"
-                raise FragmentRefused(refusal("E-SYNTAX", message, other.place, asked))
+                raise FragmentRefused(refusal("PDDL_SYNTAX", message, other.place, asked))
     return fact(*(host if word == SELF and i else word for i, word in enumerate(words)))
 
 
@@ -181,7 +181,7 @@ def _hint(text: str, merged: Merged, composition: Composition) -> str:
     known = merged.domain.predicates.get(predicate)
     if known is None:
         near = nearest(predicate, merged.domain.predicates)
-        return _joined(f"nobody declares the predicate {predicate!r}", near)
+        return _joined(f"the predicate {predicate!r} is not declared", near)
     if known.arity != len(arguments):
         return f"{predicate!r} takes {known.arity} arguments, not {len(arguments)}"
     unknown = [name for name in arguments if name not in merged.objects]

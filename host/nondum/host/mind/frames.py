@@ -36,7 +36,7 @@ def mounts_to_wire(host: str, mounts: Iterable[MountPose]) -> dict[str, list[obj
 
 
 def mounts_of_all(snapshot: Snapshot) -> dict[str, list[object]]:
-    """The mount tables of this host and its peers, each peer a body of its own."""
+    """The mount tables of this host and its peers; each peer is a separate body."""
     found = mounts_to_wire(snapshot.host, snapshot.mounts)
     for peer in snapshot.peers:
         found |= mounts_to_wire(peer.name, peer.mounts)

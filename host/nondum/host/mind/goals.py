@@ -116,7 +116,7 @@ class GoalQueue:
     def give(
         self, text: str, pddl: str, kind: GoalKind, *, priority: int = 0, id: str = ""
     ) -> GivenGoal:
-        """Add a goal; with an `id` of its own it takes the place of the one before of that id.
+        """Add a goal; with an `id` it takes the place of the goal that has had that id.
 
         What was kept counts as given when its words were said.
         """

@@ -20,6 +20,8 @@ from nondum.host.core.names import shortened
 from nondum.host.core.records import GoalRecord, Snapshot
 from nondum.host.mind.announcements import People, kept_out, recomposed
 from nondum.host.mind.beliefs import Beliefs
+from nondum.host.mind.component_leaf import ComponentLeaf
+from nondum.host.mind.component_step import component_step
 from nondum.host.mind.composition import Composition, compose
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.halted import Halts
@@ -31,6 +33,8 @@ from nondum.host.mind.short_names import short_names
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
 from nondum.planning.execute.attempts import Patience
+from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.step import Step
 from nondum.planning.merge.goal import Goal, GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.facts import fact
 from nondum.sdk.errors import GoalRefused, Problem
@@ -69,6 +73,7 @@ class Mind:
         """Whole names of units and streams → short ones; also of those that have just gone."""
         self.people = People(wall_s, lambda text: shortened(text, self.names))
         self.runner = BehaviourRunner(calls, self.beliefs, now_s)
+        self.leaves = RunningLeaves(self.runner, now_s)
         self.composition: Composition | None = None
         self.version = 0
         """Rises whenever a view may look different."""
@@ -86,7 +91,7 @@ class Mind:
         self.pursuit = Pursuit(
             queue=self.queue,
             beliefs=self.beliefs,
-            runner=self.runner,
+            leaves=self.leaves,
             planners=planners,
             people=self.people,
             emit=emit,
@@ -146,7 +151,7 @@ class Mind:
         id: str = "",
     ) -> GivenGoal:
         """Want something, in words or in PDDL; `said` are words that the PDDL was understood from,
-        `id` is its id if it is to have one of its own.
+        `id` is its id if it is to have a given one.
 
         Raises `GoalRefused`.
         """
@@ -165,7 +170,7 @@ class Mind:
     def keep(self, words: str, *, priority: int = 0, reason: str = "") -> GivenGoal:
         """Keep words that mean nothing yet, as a goal that can be halted like any other.
 
-        Whoever keeps them gives them under their id once they mean something.
+        The caller gives them under their id once they mean something.
         """
         given = self.queue.keep(words, priority=priority, reason=reason)
         self.people.tell(f"{words!r} is kept until it means something: that is goal {given.id}")
@@ -238,14 +243,16 @@ class Mind:
                 self._news.clear()
                 earliest_s = loop.time() + PAUSE_S
                 self._tick_safely()
+                self._halt_unticked()
                 afterwards, self._afterwards = self._afterwards, []
                 for do in afterwards:
                     do()
                 if self._may_look_different():
                     async with self._viewers:
                         self._viewers.notify_all()
+                is_busy = self.pursuit.pursued or self.leaves
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(BUSY_S if self.pursuit.pursued else IDLE_S):
+                    async with asyncio.timeout(BUSY_S if is_busy else IDLE_S):
                         await self._news.wait()
                 await asyncio.sleep(max(0.0, earliest_s - loop.time()))
         finally:
@@ -267,6 +274,11 @@ class Mind:
             await asyncio.gather(self._composing, return_exceptions=True)
         await self._planners.close()
 
+    def _halt_unticked(self) -> None:
+        """Halt what a tree has started and no tree ticks any more."""
+        for step in self.leaves.expire():
+            self.people.tell(f"{step.name} is halted: no behaviour tree ticks it any more")
+
     def _tick_safely(self) -> None:
         """A fault in a tick, most likely of an integrator's own leaf, stops the robot, not the
         host."""
@@ -275,7 +287,7 @@ class Mind:
         except Exception as error:
             log.exception("a tick of the system tree failed")
             self.runner.halt_all()
-            self.people.tell(f"the system tree is at fault: {type(error).__name__}: {error}")
+            self.people.tell(f"the system tree failed: {type(error).__name__}: {error}")
 
     # Parts of the system tree
 
@@ -286,7 +298,18 @@ class Mind:
             goals=Duty("goals", self._choose),
             task=TaskSlot(lambda: self.pursuit.trees, Hold(self._waits_for)),
             people=Duty("people", lambda: f"{self.people.last_number} sentences told"),
+            behaviour=self._behaviour_leaf,
+            facts=lambda: self.beliefs.world.facts,
         )
+
+    def _behaviour_leaf(self, behaviour: str, *, of: str, **arguments: str) -> Behaviour:
+        def step() -> Step:
+            if self.composition is None:
+                raise _too_early()
+            facts = self.beliefs.world.facts
+            return component_step(self.composition, facts, behaviour, of, arguments)
+
+        return ComponentLeaf(of, behaviour, step, self.leaves)
 
     def _monitor(self) -> str:
         if self._composing is not None and self._composing.done():
@@ -335,8 +358,7 @@ class Mind:
         if (words is None) == (pddl is None):
             raise ValueError("a goal is given in words or in PDDL")
         if self.composition is None:
-            text = "the host does not know itself yet"
-            raise GoalRefused(Problem("GOAL_TOO_EARLY", text, fix="ask again in a second"))
+            raise _too_early()
         if words is not None:
             return self.composition.book.goal(words)
         assert pddl is not None  # the other way to give one
@@ -356,6 +378,11 @@ class Mind:
         self._told_version = seen
         self.version += 1
         return True
+
+
+def _too_early() -> GoalRefused:
+    text = "the host does not know itself yet"
+    return GoalRefused(Problem("GOAL_TOO_EARLY", text, fix="ask again in a second"))
 
 
 def composed(snapshot: Snapshot) -> Composition | str:

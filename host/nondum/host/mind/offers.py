@@ -30,7 +30,7 @@ from nondum.sdk.planner import AlreadyTrue, Unsolvable
 Row: TypeAlias = dict[str, Any]
 
 MOST_EXPLAINED = 50
-"""So many goals that cannot be had are explained; of the rest it is only said."""
+"""Goals that cannot be had and are explained, at most; of the rest it is only said."""
 _NOTHING = WhyNot(())
 
 

@@ -20,7 +20,7 @@ class PlannerFolder:
         self._path: Path | None = None
 
     def make(self) -> dict[str, str]:
-        """Make it anew, without what was left there: environment variables that name it.
+        """Make it empty, and return the environment variables that name it.
 
         There are none where it cannot be made: most planners need no files, and a disk may be full.
         """
@@ -33,7 +33,7 @@ class PlannerFolder:
                 _remove(self._path)  # of the daemon before
                 self._path.mkdir(mode=0o700, parents=True)
         except OSError as error:
-            log.warning("planner %s has no folder of its own: %s", self._name, error)
+            log.warning("planner %s has no folder for its files: %s", self._name, error)
             return {}
         return {"TMPDIR": str(self._path)}
 

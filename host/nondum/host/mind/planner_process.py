@@ -1,4 +1,4 @@
-"""One planner in a process of its own: kept warm, killed when it overruns or is not wanted."""
+"""One planner in a separate process: kept warm, killed when it overruns or is not wanted."""
 
 from __future__ import annotations
 

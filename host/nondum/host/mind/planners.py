@@ -48,7 +48,7 @@ class Found:
 
     answer: Answer
     planner: str
-    """Who found it; empty where no search was needed, or nobody found anything."""
+    """The planner that found it; empty where no search was needed, or none found anything."""
     took_s: float
 
 

@@ -22,15 +22,15 @@ from nondum.host.mind.diagnosis import Seen, seen_in
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced, urgency
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursued import Pursued, conflicts
-from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.search import search, task_of
 from nondum.host.mind.search_order import Turns
-from nondum.host.mind.situation import NoPlan, Others, Outcome, Past, Planned, Situation, Waits
+from nondum.host.mind.situation import NoPlan, OtherPlans, Outcome, Past, Planned, Situation, Waits
 from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
 from nondum.planning.execute.independence import Reservation
 from nondum.planning.execute.plan_executive import Phase, PlanExecutive
 from nondum.planning.execute.replay import beginning_at, replayed
 from nondum.planning.execute.running import Run
+from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.planning.ground.conditional_effects import plain
 from nondum.planning.merge.goal import parse_goal
@@ -48,7 +48,7 @@ class Pursuit:
         *,
         queue: GoalQueue,
         beliefs: Beliefs,
-        runner: BehaviourRunner,
+        leaves: RunningLeaves,
         planners: Planners,
         people: People,
         emit: Emit,
@@ -61,7 +61,7 @@ class Pursuit:
         self.queue = queue
         self._pursued: dict[str, Pursued] = {}
         self._beliefs = beliefs
-        self._runner = runner
+        self._leaves = leaves
         self._planners = planners
         self._people = people
         self._emit = emit
@@ -120,7 +120,7 @@ class Pursuit:
     def troubles(self) -> dict[str, str]:
         """Actions that fail and are tried again, or are left out for it, and how they failed."""
         controls = [one.tree.control for one in self.pursued]
-        well = {name for control in controls for name in control.steady(self._now_s())}
+        well = {name for control in controls for name in control.proven(self._now_s())}
         attempts = [control.attempts for control in controls]
         attempts = attempts or [Attempts(self._patience, self.setbacks)]
         return {
@@ -211,7 +211,7 @@ class Pursuit:
         if phase is not one.phase:
             one.phase, one.trouble = phase, ""
             self._tell_phase(one, phase)
-        for name in control.steady(self._now_s()):
+        for name in control.proven(self._now_s()):
             control.attempts.effective(name)
         if phase is Phase.UNDER_WAY and (trouble := control.trouble()) != one.trouble:
             one.trouble = trouble
@@ -243,16 +243,16 @@ class Pursuit:
     def _situation(self, goal: str) -> Situation:
         revision = self._composition.revision if self._composition else 0
         world = self._beliefs.world
-        return Situation(goal, revision, world.bare_facts, self.excluded, self._others(goal))
+        return Situation(goal, revision, world.bare_facts, self.excluded, self._other_plans(goal))
 
-    def _others(self, goal: str) -> Others:
+    def _other_plans(self, goal: str) -> OtherPlans:
         others = [one for one in self.pursued if one.goal != goal]
         if not others:
-            return Others()
+            return OtherPlans()
         mine = urgency(self.queue[goal])
         firm = [one for one in others if urgency(self.queue[one.goal]) < mine]
         yielding = others[len(firm) :]
-        return Others(
+        return OtherPlans(
             tuple(one.reservation for one in firm),
             tuple(one.reservation for one in yielding),
             self._facts_with(firm),
@@ -417,7 +417,7 @@ class Pursuit:
                 self._tried.pop(self.queue[id].number, None)  # it is put aside, not given up
                 self._put_aside(id, goal.id, shared)
         # Without those that it put aside the answer is the same.
-        self._tried[goal.number] = replace(found.situation, others=self._others(goal.id))
+        self._tried[goal.number] = replace(found.situation, others=self._other_plans(goal.id))
         self.queue.put(goal.id, GoalState.ACTIVE)
         self._grow(goal.id, found.task, found.plan, runs=handed_over)
         called = short_names.steps(found.names, {})
@@ -450,7 +450,7 @@ class Pursuit:
             task,
             plan,
             lasting=self._composition.merged.lasting(),
-            runner=self._runner,
+            leaves=self._leaves,
             kind=goal.kind,
             sight=lambda: (self._beliefs.world, self._now_s()),
             exclusive=exclusive,

@@ -34,7 +34,7 @@ BESIDE_S = 2.0
 AT_ONCE = 2_000
 """Ground actions that the loop can spare the time for: some tens of milliseconds."""
 SMALL = 20
-"""Up to so many components, grounding takes less of the loop than a thread's switching does."""
+"""Up to this number of components, grounding takes less time than switching to a thread."""
 
 
 def task_of(

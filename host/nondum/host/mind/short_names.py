@@ -19,9 +19,9 @@ def short_names(objects: Mapping[str, Object]) -> dict[str, str]:
 
     >>> def unit(component: str, local: str) -> Object:
     ...     return Object(f"rover__{component}__{local}", ("unit",), local, "rover", component)
-    >>> units = [unit("eye", "camera"), unit("eye", "image"), unit("ear", "image")]
+    >>> units = [unit("eye", "camera"), unit("eye", "image"), unit("lens", "image")]
     >>> sorted(short_names({unit.name: unit for unit in units}).values())
-    ['camera', 'ear.image', 'eye.image']
+    ['camera', 'eye.image', 'lens.image']
     """
     owned = [found for found in objects.values() if found.component]
     # What is no unit has its own name already, and keeps it.

@@ -14,7 +14,7 @@ from nondum.sdk.planner import GroundTask, Plan
 
 
 @dataclass(frozen=True, slots=True)
-class Others:
+class OtherPlans:
     """The plans that are carried out for other goals."""
 
     firm: tuple[Reservation, ...] = ()
@@ -43,7 +43,7 @@ class Situation:
     """What holds when no lasting behaviour runs."""
     excluded: frozenset[str]
     """Actions that failed too often to be planned with for now."""
-    others: Others = Others()
+    others: OtherPlans = OtherPlans()
 
     def is_like(self, other: Situation) -> bool:
         """Whether only facts differ: a search goes on, and its plan is checked when it comes."""

@@ -1,7 +1,7 @@
 """The system tree: what a host does at every tick, a behaviour tree that integrators can replace.
 
 `default_tree` is monitor → world model → goals → task → people. An integrator's function gets the
-`Parts` of the mind and composes them, with behaviours of its own, to another tree:
+`Parts` of the mind and composes them, with its own behaviours, to another tree:
 `system_tree = "package:function"` in the host's configuration. It is trusted, and its leaves must
 not block.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
@@ -106,9 +106,20 @@ def _together(statuses: Sequence[Status]) -> Status:
     return Status.SUCCESS if statuses else Status.FAILURE
 
 
+class MakesLeaves(Protocol):
+    """Makes leaves that run behaviours of components."""
+
+    def __call__(self, behaviour: str, *, of: str, **arguments: str) -> Behaviour:
+        """A leaf that runs a behaviour of component `of` while it is ticked (`ComponentLeaf`).
+
+        `arguments` binds parameters of the behaviour's action that are not to be chosen.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a system tree is composed of. Each may stand in the tree once."""
+    """What a system tree is composed of. Each node may stand in the tree once."""
 
     monitor: Behaviour
     """Takes over a new composition when the catalogue has a new revision."""
@@ -120,6 +131,10 @@ class Parts:
     """The slot of the task trees."""
     people: Behaviour
     """Tells people."""
+    behaviour: MakesLeaves
+    """Makes leaves of an integrator: `parts.behaviour("dock", of="charger")`."""
+    facts: Callable[[], frozenset[str]]
+    """What is believed now: `"low battery" in parts.facts()`."""
 
 
 SystemTree: TypeAlias = Callable[[Parts], Behaviour]

@@ -20,11 +20,11 @@ from nondum.planning.pddl.syntax import type_text
 from nondum.sdk.errors import GoalRefused, Problem
 
 UNMATCHED = frozenset({"PHRASE_UNKNOWN", "PHRASE_WORDS_UNKNOWN"})
-"""Refusals of words that a translator may still understand; of ambiguous ones nobody is asked."""
+"""Refusals of words that a translator may still understand; it is not asked of ambiguous ones."""
 LONGEST_WORDS = 1000
 """Characters of a sentence that is translated."""
 VOCABULARY_BYTES = 40_000
-"""What a packet to a worker has room for, and some to spare."""
+"""The size of a vocabulary that fits a packet to a worker, with some margin."""
 _ENTRIES = 400
 
 Vocabulary: TypeAlias = dict[str, Any]
@@ -72,8 +72,8 @@ async def translated(
     for component, answer in sorted(answers.items()):
         try:
             found.setdefault(_checked(component, answer, composition()), []).append(component)
-        except GoalRefused as amiss:
-            problems += amiss.problems
+        except GoalRefused as wrong:
+            problems += wrong.problems
     readings = [Understood(pddl, kind, tuple(by)) for (pddl, kind), by in found.items()]
     if len(readings) > 1:
         raise GoalRefused(_ambiguous(words, readings))

@@ -12,6 +12,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.composites import Parallel, Selector, Sequence
 
+from nondum.host.mind.component_leaf import ComponentLeaf
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import GoalQueue
 from nondum.host.mind.pursued import Pursued
@@ -69,6 +70,8 @@ class TreeView:
             row["task"] = self._task(node)
         elif isinstance(node, StepLeaf):
             row["step"] = self._step(node)
+        elif isinstance(node, ComponentLeaf):
+            row["behaviour"] = {"component": node.component, "behaviour": node.behaviour}
         return row | {"children": [self.row(child) for child in node.children]}
 
     # A plan
@@ -77,7 +80,7 @@ class TreeView:
         control = tree.control
         row: Row = {
             "phase": control.phase.value,
-            "steps": len(tree.children),
+            "steps": len(tree.steps),
             "left": control.rest.steps.bit_count(),
             "excluded": sorted(self._pursuit.excluded),
         }
@@ -162,7 +165,7 @@ class TreeView:
         return {"fact": link.fact, **_step_named(name, link.consumer)}
 
     def _locks(self, leaf: StepLeaf, where: StepStatus) -> Row:
-        """What nobody else has meanwhile: a unit that serves one behaviour, and facts."""
+        """What no other step has meanwhile: a unit that serves one behaviour, and facts."""
         unit = leaf.step.actor if where.exclusive else None
         return {"unit": unit, "takes": list(where.takes)}
 
@@ -170,7 +173,7 @@ class TreeView:
 
     def _chosen(self, leaf: StepLeaf) -> Row:
         action = leaf.step.action
-        others = self._others(leaf)
+        others = self._other_choices(leaf)
         excluded = self._excluded_for(leaf)
         return {
             "why": _why_kept(leaf, others) or _why_chosen(action, others, excluded),
@@ -191,7 +194,7 @@ class TreeView:
         everyone = composition.snapshot.everyone() if composition else ()
         return next((c.rank for _, c in everyone if c.id == name), None)
 
-    def _others(self, leaf: StepLeaf) -> tuple[GroundAction, ...]:
+    def _other_choices(self, leaf: StepLeaf) -> tuple[GroundAction, ...]:
         tree, composition = leaf.parent, self._composition()
         if not isinstance(tree, TaskTree) or composition is None:
             return ()
@@ -242,7 +245,7 @@ def _why_kept(leaf: StepLeaf, others: tuple[GroundAction, ...]) -> str:
     if not others or cost <= others[0].cost or begun_s is None:
         return ""
     cheapest = others[0].cost
-    return f"it costs {cost}, not {cheapest}, but a plan that goes on is not thrown over for that"
+    return f"it costs {cost}, not {cheapest}, but a running plan is not preempted for that"
 
 
 def _why_chosen(action: GroundAction, others: tuple[GroundAction, ...], excluded: list[str]) -> str:

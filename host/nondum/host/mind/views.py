@@ -22,7 +22,6 @@ from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.task_tree import StepLeaf
 from nondum.planning.ground.conclusions import conclusions
 from nondum.sdk.description import Behaviour
 
@@ -73,8 +72,7 @@ class Views:
         running = {run.step.name: run for run in self._mind.runner}
         called = self._called(one)
         steps = []
-        for leaf in one.tree.children:
-            assert isinstance(leaf, StepLeaf)  # a task tree has no other children
+        for leaf in one.tree.steps:
             run = running.get(leaf.name)
             state = run.state.value if run else _STATES[leaf.status.value]
             why = "; ".join(filter(None, (leaf.why(), run.progress if run else "")))
@@ -252,8 +250,8 @@ class Views:
         return rows
 
     def streams(self) -> list[Row]:
-        """Who sends what to whom, as the running plan wires it: `stream`, `type`, `component`,
-        `flowing`, `consumers`."""
+        """The streams and their consumers, as the running plan wires them: `stream`, `type`,
+        `component`, `flowing`, `consumers`."""
         consumers: dict[str, list[str]] = {}
         for run in self._mind.runner:
             for stream in run.streams:
@@ -296,7 +294,7 @@ class Views:
 
     def _called(self, one: Pursued) -> Mapping[str, str]:
         """What the steps of a plan are called."""
-        return short_names.steps((leaf.name for leaf in one.tree.children), self._mind.names)
+        return short_names.steps((leaf.name for leaf in one.tree.steps), self._mind.names)
 
     def _told(self, text: str, called: Mapping[str, str]) -> str:
         return short_names.told(text, called, self._mind.names)

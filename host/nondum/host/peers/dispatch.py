@@ -1,4 +1,4 @@
-"""Where peers' calls arrive: each is handed to whoever carries such calls out."""
+"""Dispatch of peers' calls: each is passed to the function that serves its method."""
 
 from __future__ import annotations
 

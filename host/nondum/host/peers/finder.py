@@ -70,7 +70,7 @@ class PeerFinder:
             self._on_hint(hint)
 
     def _look_again(self) -> None:
-        """Whoever is to be paired with opens its window at about the same time."""
+        """Look again, and again later: the host to pair with may not have opened its window yet."""
         self._discovery.look_again()
         loop = asyncio.get_running_loop()
         self._looking = loop.call_later(PAIRING_LOOK_S, self._look_again)

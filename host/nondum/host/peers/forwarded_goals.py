@@ -36,7 +36,7 @@ class ForwardedGoals:
         return list(self._rows.values())
 
     def add(self, host: str, words: str, priority: int, answer: Mapping[str, Any]) -> Row:
-        """A peer has taken words as a goal of its own, and answered so."""
+        """Add the goal that a peer has made of words, from the peer's answer."""
         id = _text(answer.get("goal"))
         row: Row = {
             "id": id,
@@ -61,7 +61,7 @@ class ForwardedGoals:
         return dict(row)
 
     def hear(self, host: str, told: Mapping[str, Any]) -> None:
-        """A peer tells how a goal stands, see `standing`; of one that was not given, nothing."""
+        """A peer tells how a goal stands, see `goal_status`; of one that was not given, nothing."""
         row = self._rows.get((host, _text(told.get("goal"))))
         if row is None:
             return
@@ -106,7 +106,7 @@ class ForwardedGoals:
         self._news = asyncio.Event()
 
 
-def standing(row: Mapping[str, Any]) -> dict[str, Any]:
+def goal_status(row: Mapping[str, Any]) -> dict[str, Any]:
     """What is told of a goal's row to the host that gave it."""
     problems = [
         {

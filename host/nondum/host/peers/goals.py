@@ -17,7 +17,7 @@ from nondum.host.core.printable import printable
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
-from nondum.host.peers.forwarded_goals import MOST_KEPT, ForwardedGoals, replaced, standing
+from nondum.host.peers.forwarded_goals import MOST_KEPT, ForwardedGoals, goal_status, replaced
 from nondum.host.peers.remote_calls import Reaches
 from nondum.host.people.conversation import given_goal, wanted
 from nondum.host.people.stopping import Stopped, is_stop_for_stranger, said_to
@@ -69,7 +69,7 @@ class Goals:
         """
         if is_stop(words):
             return str(await self.stop_all())
-        peer, rest = await self.whose(words)
+        peer, rest = await self.addressee(words)
         if peer is not None:
             given = await self.give(peer, rest)
             if "stopped" in given:
@@ -81,7 +81,7 @@ class Goals:
             return str(await self.stop_all())
         return wanted(self._mind(), rest)
 
-    async def whose(self, words: str) -> tuple[str | None, str]:
+    async def addressee(self, words: str) -> tuple[str | None, str]:
         """The peer whose goal words are, None for this host; and the words without its name. Words
         that stop are never asked about.
 
@@ -195,7 +195,7 @@ class Goals:
         for row in rows:
             if not self._mind().queue[row["id"]].state.is_final:
                 self._is_of(row["id"], caller)
-        return {"standings": [standing(row) for row in rows]}
+        return {"standings": [goal_status(row) for row in rows]}
 
     async def close(self) -> None:
         """Tell no one any more, and ask no one."""
@@ -225,7 +225,7 @@ class Goals:
         if isinstance(text := args.get("text"), str):
             self._mind().people.tell(f"{peer}: {printable(text[:MAX_WORDS])}")
 
-    def hear_standing(self, peer: str, args: Mapping[str, Any]) -> None:
+    def on_goal_status(self, peer: str, args: Mapping[str, Any]) -> None:
         """A peer tells how a goal stands that was given from here."""
         self._away.hear(peer, args)
 
@@ -235,7 +235,7 @@ class Goals:
         while self._givers:
             version = await self._mind().changed(version)
             for row in self._mind().views.given():
-                giver, now = self._givers.get(row["id"]), standing(row)
+                giver, now = self._givers.get(row["id"]), goal_status(row)
                 if giver is not None and told.get(row["id"]) != now:
                     told[row["id"]] = now
                     with contextlib.suppress(NondumError):  # it is gone, or busy
@@ -271,7 +271,7 @@ class Goals:
         with contextlib.suppress(NondumError):  # it is gone, or busy: the goal is this host's now
             self._reach.notify(giver, "goal.news", {"text": text[:MAX_WORDS]})
             for row in rows:
-                self._reach.notify(giver, "goal.standing", standing(row))
+                self._reach.notify(giver, "goal.standing", goal_status(row))
 
     def _words(self, incoming: IncomingCall) -> str:
         words = incoming.args.get("words")

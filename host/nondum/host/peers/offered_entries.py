@@ -71,7 +71,7 @@ def policy_of(composition: Composition | None, movable: frozenset[str]) -> Polic
     return Policy(movable, ACTUATORS | frozenset(moving))
 
 
-def standing(snapshot: Snapshot, policy: Policy) -> Entries:
+def catalogue_entries(snapshot: Snapshot, policy: Policy) -> Entries:
     """The entries that change with the catalogue only."""
     entries: Entries = {}
     shared: set[str] = set()

@@ -26,7 +26,7 @@ from nondum.transport.peers.pairing_state import (
 from nondum.transport.peers.refusals import Refusal
 
 LOOK_S = 0.25
-"""How often is looked who can be paired, while nobody is."""
+"""Seconds between two looks for hosts that can be paired, while no pairing runs."""
 
 log = logging.getLogger(__name__)
 
@@ -59,11 +59,12 @@ class Candidate:
 
 
 class PairingRequests:
-    """Opens the window, finds the other host, and hands whom it agreed with to the trust keeper."""
+    """Opens the pairing window, finds the other host, and adds the paired host to the trust
+    store."""
 
     def __init__(
         self,
-        keeper: PeerTrustStore,
+        trust_store: PeerTrustStore,
         *,
         announce: Callable[[int | None], None],
         candidates: Callable[[], Iterable[Hint]],
@@ -75,7 +76,7 @@ class PairingRequests:
         any more (None); `candidates` gives what is known of others now, `known` the names of hosts
         that are here. `address` is where to be asked, as ZeroMQ binds it."""
         self._address = address
-        self._keeper, self._announce, self._candidates = keeper, announce, candidates
+        self._trust_store, self._announce, self._candidates = trust_store, announce, candidates
         self._known = known
         self._is_development = is_development
         self._window: _Window | None = None
@@ -83,16 +84,16 @@ class PairingRequests:
     async def pair(self, wanted: str | None = None) -> AsyncGenerator[Row, None]:
         """Open the window, and tell how it stands whenever that changes, until it is closed.
 
-        `wanted` is the name, fingerprint or key of the only host to be paired with. Whoever stops
-        listening has given it up. Rows are those of `row`. Raises `PeerRefused` (PAIRING_OPEN,
-        PAIRING_DEVELOPMENT, ADDRESS_UNUSABLE).
+        `wanted` is the name, fingerprint or key of the only host to be paired with. The window is
+        closed when the caller stops iterating. Rows are those of `row`. Raises `PeerRefused`
+        (PAIRING_OPEN, PAIRING_DEVELOPMENT, ADDRESS_UNUSABLE).
         """
         if self._window is not None:
             told = "somebody is pairing this host already"
             fix = "confirm there, or with `nondum peers pair --yes-code CODE`"
             raise PeerRefused(Problem("PAIRING_OPEN", told, fix=fix))
         window = self._window = _Window(
-            self._keeper, wanted, self._known, is_development=self._is_development
+            self._trust_store, wanted, self._known, is_development=self._is_development
         )
         try:
             self._announce(window.host.open(self._address))
@@ -141,31 +142,31 @@ class PairingRequests:
 
     def _open_window(self) -> _Window:
         if self._window is None:
-            told = "nobody is pairing this host"
+            told = "no pairing of this host is open"
             fix = "begin with `nondum peers pair` on both hosts"
             raise PeerRefused(Problem("PAIRING_ORDER", told, fix=fix))
         return self._window
 
 
 class _Window:
-    """One window, from its opening to whom it brought."""
+    """One pairing window, from its opening until the paired host is stored."""
 
     def __init__(
         self,
-        keeper: PeerTrustStore,
+        trust_store: PeerTrustStore,
         wanted: str | None,
         known: Callable[[], Mapping[PeerKey, str]],
         *,
         is_development: bool,
     ) -> None:
-        self._keeper, self._wanted, self._known = keeper, wanted, known
+        self._trust_store, self._wanted, self._known = trust_store, wanted, known
         self._found: Mapping[PeerKey, Candidate] = {}
         self._asked: Candidate | None = None
         self._news = asyncio.Event()
         self._keeping: asyncio.Task[None] | None = None
         self._shown: PairingState = Idle()
-        """As the host has it, but that whom it agreed with is first kept."""
-        identity = keeper.identity(development=is_development)
+        """The state of the host, except that a paired host is stored before it is shown."""
+        identity = trust_store.identity(development=is_development)
         self.host = PairingHost(
             identity,
             self._on_change,
@@ -194,7 +195,7 @@ class _Window:
         if not is_free or len(self._found) != 1:
             return
         (candidate,) = self._found.values()
-        if self._keeper.key < candidate.key and candidate != self._asked:
+        if self._trust_store.key < candidate.key and candidate != self._asked:
             self._asked = candidate
             self.host.ask(candidate.key, candidate.addresses)
 
@@ -251,7 +252,7 @@ class _Window:
 
     async def _keep(self, agreed: Agreed) -> None:
         try:
-            await self._keeper.pair(agreed.key, agreed.name)
+            await self._trust_store.pair(agreed.key, agreed.name)
             self._shown = agreed
         except PeerRefused as refused:
             self._shown = Failed(refused.problems[0])
@@ -261,14 +262,14 @@ class _Window:
         self._news = asyncio.Event()
 
     def _is_wanted(self, key: PeerKey, name: str) -> bool:
-        if key == self._keeper.key or key in self._keeper.trust.revoked:
+        if key == self._trust_store.key or key in self._trust_store.trust.revoked:
             return False
         wanted = self._wanted
         return wanted is None or wanted in (name, key) or wanted.upper() == fingerprint(key)
 
     def _holder(self, name: str) -> PeerKey | None:
         """Who has a name already, among those that are here or paired."""
-        known = {**self._known(), **self._keeper.trust.paired}
+        known = {**self._known(), **self._trust_store.trust.paired}
         return next((key for key, one in known.items() if one == name), None)
 
 

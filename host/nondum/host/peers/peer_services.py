@@ -62,7 +62,7 @@ class PeerServices:
     def __init__(
         self,
         config: HostConfig,
-        keeper: PeerTrustStore,
+        trust_store: PeerTrustStore,
         workers: Workers,
         catalogue: Catalogue,
         emit: Emit,
@@ -76,7 +76,7 @@ class PeerServices:
         """Use `open`. `mind` is asked for once the host runs; `stop` stops this host, `answer`
         answers what is asked about it."""
         host = config.host.name
-        self.keeper = keeper
+        self.trust_store = trust_store
         self._tasks: set[asyncio.Task[None]] = set()
         self._troubles: list[str] = []
         self._listens = listens(config.peers)
@@ -92,15 +92,15 @@ class PeerServices:
         )
         clock = asyncio.get_running_loop().time
         self._strangers = RejectedHosts(emit, clock)
-        self._namesakes = NameConflicts(host, clock, self._hints)
+        self._name_conflicts = NameConflicts(host, clock, self._hints)
         self.requests = Dispatcher()
         self.requests.add("behave", self.serving.behave, self.serving.orphaned)
         self.requests.hear("values", self.serving.values)
         self.finder: PeerFinder | None = None
         self.fleet = fleet_of(
             config,
-            keeper.identity(development=config.peers.development),
-            keeper.trust,
+            trust_store.identity(development=config.peers.development),
+            trust_store.trust,
             self.requests,
             on_event=self._on_fleet,
             find=lambda mesh: self._find(mesh, config.peers),
@@ -119,7 +119,7 @@ class PeerServices:
             security=self.fleet.security,
             snapshot=catalogue.snapshot,
             peers=lambda: self.fleet.peers,
-            trust=lambda: keeper.trust,
+            trust=lambda: trust_store.trust,
             hints=self._hints,
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.fleet.refusals,
@@ -130,9 +130,9 @@ class PeerServices:
         )
         self._streams.serve(self.requests)
         self.trust = TrustOrders(
-            keeper,
+            trust_store,
             PairingRequests(
-                keeper,
+                trust_store,
                 announce=self._announce_pairing,
                 candidates=self._hints,
                 known=lambda: {peer.key: peer.name for peer in self.fleet.peers.values()},
@@ -154,7 +154,7 @@ class PeerServices:
         self.requests.add("goal.give", self.goals.serve_give)
         self.requests.add("goal.again", self.goals.serve_again)
         self.requests.hear("goal.news", self.goals.hear_news)
-        self.requests.hear("goal.standing", self.goals.hear_standing)
+        self.requests.hear("goal.standing", self.goals.on_goal_status)
         self.placement = placement
         placement.serve(self.requests)
         self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
@@ -176,7 +176,7 @@ class PeerServices:
     ) -> PeerServices:
         """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
         now. Raises `PeerRefused`."""
-        keeper = await PeerTrustStore.open(
+        trust_store = await PeerTrustStore.open(
             folders.peers,
             config.host.name,
             on_change=lambda trust: made._on_trust(trust),
@@ -201,7 +201,7 @@ class PeerServices:
         )
         bridge = Bridge(children.forks, listens(config.peers), port=config.peers.stream_port)
         made = cls(
-            *(config, keeper, workers, catalogue, emit, compute),
+            *(config, trust_store, workers, catalogue, emit, compute),
             *(mind, stop, answer, placement, bridge),
         )
         return made
@@ -212,7 +212,11 @@ class PeerServices:
         is_open = self.fleet.security is Security.DEVELOPMENT
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
         own = self.finder.identity_problem if self.finder else None
-        problems = (*self.keeper.warnings, *self._namesakes.problems, *((own,) if own else ()))
+        problems = (
+            *self.trust_store.warnings,
+            *self._name_conflicts.problems,
+            *((own,) if own else ()),
+        )
         return (*unsafe, *map(str, problems), *self._troubles)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
@@ -258,7 +262,7 @@ class PeerServices:
         await self.fleet.close()
 
     def _on_certificate(self, certificate: bytes) -> None:
-        if isinstance(self.fleet, Mesh):  # by way of a router, nobody asks for it
+        if isinstance(self.fleet, Mesh):  # by way of a router, no peer asks for it
             self.fleet.show_certificate(certificate)
 
     def _on_trust(self, trust: Trust) -> None:
@@ -268,7 +272,7 @@ class PeerServices:
 
     def _on_fleet(self, event: FleetEvent) -> None:
         self.view.on_fleet(event)
-        self._namesakes.on_fleet(event)
+        self._name_conflicts.on_fleet(event)
         match event:
             case Refusal():
                 self._strangers.turned_away(event)
@@ -286,7 +290,7 @@ class PeerServices:
         """Take this host's certificate, if a drive brought it, and is of use."""
         for data in event.certificates:
             try:
-                taken = await self.keeper.offer(data.encode("ascii"))
+                taken = await self.trust_store.offer(data.encode("ascii"))
             except PeerRefused as refused:
                 self._mind().people.tell(f"drive {event.drive}: {refused.problems[0]}")
                 return

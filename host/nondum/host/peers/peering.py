@@ -29,10 +29,10 @@ from nondum.host.core.records import Snapshot
 from nondum.host.peers.offered_entries import (
     Entries,
     Policy,
+    catalogue_entries,
     changes,
     objects_of,
     passing,
-    standing,
 )
 from nondum.host.peers.peer_entries import (
     Claim,
@@ -73,7 +73,7 @@ class Peering:
         self._taken, self._about = taken, about
         self._introduced: dict[PeerKey, Introduced] = {}
         self._claims: dict[PeerKey, dict[str, Claim]] = {}
-        self._standing: Entries = {}
+        self._lasting: Entries = {}
         self._passing: Entries = {}
         self._publishing: asyncio.Handle | None = None
         self._is_recomposed = True
@@ -95,12 +95,12 @@ class Peering:
     def publish(self) -> None:
         """Tell peers what is not as they were told."""
         self._publishing = None
-        snapshot, policy, before = self._snapshot(), self._policy(), self._standing | self._passing
+        snapshot, policy, before = self._snapshot(), self._policy(), self._lasting | self._passing
         if self._is_recomposed:
             self._is_recomposed = False
-            self._standing = self._about | standing(snapshot, policy)
+            self._lasting = self._about | catalogue_entries(snapshot, policy)
         self._passing = passing(snapshot, policy, self._claims_here, self._taken())
-        if news := changes(before, self._standing | self._passing):
+        if news := changes(before, self._lasting | self._passing):
             self._tell(news)
 
     def _publish_soon(self) -> None:

@@ -1,4 +1,4 @@
-"""Who knocks and is not let in: people are told of each once, and not of many."""
+"""Announces each host that is turned away once, at a limited rate."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers import PeerKey, Reason, Refusal, fingerprint
 
 BURST, EVERY_S = 5, 60.0
-"""So many strangers are told of at once, and one more in so many seconds."""
+"""BURST hosts are announced at once, then one more every EVERY_S seconds."""
 MOST_KNOWN = 1000
 
 _FIXES = {
     Reason.UNKNOWN_KEY: "if it is one of yours: `nondum peers pair` on both",
     Reason.CERTIFICATE: "have the fleet's owner sign a new certificate, or pair the two hosts",
-    Reason.DUPLICATE: "give one of the two hosts another name, or a key of its own",
+    Reason.DUPLICATE: "give one of the two hosts another name, or its own key",
     Reason.ENDLESS: "look what runs there; if it was taken over, `nondum peers revoke`",
     Reason.FLOODING: "look for what it runs that calls or tells others without end",
 }

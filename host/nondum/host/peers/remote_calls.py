@@ -130,11 +130,11 @@ class AllCalls:
         arguments: Mapping[str, str],
         values: Sequence[FactValue],
     ) -> RunCall:
-        """Ask whoever has the component. Raises `NondumError`."""
+        """Start a behaviour on the host of the component. Raises `NondumError`."""
         return self._of(component).behave(component, behaviour, arguments, values)
 
     def tell_values(self, component: str, values: Sequence[FactValue]) -> None:
-        """Tell whoever has the component."""
+        """Send values to the component, on its host."""
         self._of(component).tell_values(component, values)
 
     def claims(self, component: str) -> Iterable[Event]:

@@ -1,7 +1,7 @@
 """Behaviours of this host's components that are carried out for peers.
 
-They end with their caller, as their author declared: stopped, held, or finished. What they use is
-told to everybody, this host's own mind included, so that nobody plans with it.
+They end with their caller, as their author declared: stopped, held, or finished. All hosts, this
+one included, are told what they use, so that no host plans with it.
 """
 
 from __future__ import annotations

@@ -29,27 +29,27 @@ MOST_WORDS = 200
 class TrustOrders:
     """Each method is a verb."""
 
-    keeper: PeerTrustStore
+    trust_store: PeerTrustStore
     requests: PairingRequests
     known: Callable[[], Mapping[PeerKey, str]]
-    """Hosts that are here or were, paired or certified: key → name. So that people can name whom
-    a fleet has let in."""
+    """Hosts that are here or were, paired or certified: key → name. So that people can name hosts
+    that a fleet has let in."""
 
     async def trust(self, arguments: Arguments) -> Row:
         """Who is let in, and who this host is."""
-        keeper = self.keeper
+        trust_store = self.trust_store
         return {
             **await self.key(arguments),
             "certificate": self._certificate_row(),
-            "fleets": [_row(key, name=name) for key, name in keeper.trust.fleets.items()],
-            "paired": [_row(key, name=name) for key, name in keeper.trust.paired.items()],
-            "revoked": [_row(key, why=why) for key, why in keeper.trust.revoked.items()],
-            "warnings": [problem.to_dict() for problem in keeper.warnings],
+            "fleets": [_row(key, name=name) for key, name in trust_store.trust.fleets.items()],
+            "paired": [_row(key, name=name) for key, name in trust_store.trust.paired.items()],
+            "revoked": [_row(key, why=why) for key, why in trust_store.trust.revoked.items()],
+            "warnings": [problem.to_dict() for problem in trust_store.warnings],
         }
 
     async def key(self, arguments: Arguments) -> Row:
         """This host's public key."""
-        host = self.keeper.host
+        host = self.trust_store.host
         return {"name": host.name, **_row(host.key), "public": host.to_text()}
 
     def pair(self, arguments: Arguments) -> AsyncIterator[Row]:
@@ -74,12 +74,12 @@ class TrustOrders:
 
         Raises `PeerRefused` (PEER_UNKNOWN, PEER_AMBIGUOUS, KEY_OWN, PEERS_FOLDER).
         """
-        trust = self.keeper.trust
+        trust = self.trust_store.trust
         names = _all(self.known(), trust.paired)
         key = _one(arguments.text("who"), names, may_be_new=True)
         why = arguments.text("why")[:MOST_WORDS]
         name = names.get(key, "")
-        await self.keeper.revoke(PeerKey(key), f"{why} ({name})" if name else why)
+        await self.trust_store.revoke(PeerKey(key), f"{why} ({name})" if name else why)
         return _row(key, name=name, why=why)
 
     async def forget(self, arguments: Arguments) -> Row:
@@ -88,7 +88,7 @@ class TrustOrders:
 
         Raises `PeerRefused` (PEER_UNKNOWN, PEER_AMBIGUOUS, PEERS_FOLDER).
         """
-        trust = self.keeper.trust
+        trust = self.trust_store.trust
         names = _all(trust.paired, trust.fleets, dict.fromkeys(trust.revoked, ""))
         key = _one(arguments.text("who"), names, may_be_new=False)
         kinds: dict[str, Collection[str]] = {
@@ -97,31 +97,31 @@ class TrustOrders:
             "revocation": trust.revoked,
         }
         kind = next(kind for kind, part in kinds.items() if key in part)
-        await self.keeper.forget(key)
+        await self.trust_store.forget(key)
         return _row(key, name=names[key], kind=kind)
 
     async def certify(self, arguments: Arguments) -> Row:
         """Show this `certificate` (its text) to peers. Raises `PeerRefused`."""
-        await self.keeper.certify(arguments.text("certificate").encode("utf-8"))
+        await self.trust_store.certify(arguments.text("certificate").encode("utf-8"))
         row = self._certificate_row()
         assert row is not None
         return row
 
     async def trust_fleet(self, arguments: Arguments) -> Row:
-        """Let in whom a `fleet` (the text of its public file) certifies; `name` it.
+        """Let in the hosts that a `fleet` (the text of its public file) certifies; `name` it.
 
         Raises `PeerRefused` (FILE_MALFORMED, KEY_MALFORMED, HOST_NAME, PEERS_FOLDER).
         """
         fleet = parse_fleet(arguments.text("fleet"))
         name = check_name(arguments.optional_text("name") or fleet.name)
-        await self.keeper.trust_fleet(replace(fleet, name=name))
+        await self.trust_store.trust_fleet(replace(fleet, name=name))
         return _row(fleet.key, name=name)
 
     def _certificate_row(self) -> Row | None:
-        found = self.keeper.certificate
+        found = self.trust_store.certificate
         if found is None:
             return None
-        fleets = self.keeper.trust.fleets
+        fleets = self.trust_store.trust.fleets
         return {
             "host": found.host,
             "fleet": fleets.get(found.fleet, ""),
@@ -171,7 +171,7 @@ def _one(who: str, names: Mapping[str, str], *, may_be_new: bool) -> str:
         except NondumError:
             pass
     known = ", ".join(sorted(f"{name} {fingerprint(key)}".strip() for key, name in names.items()))
-    told = f"nobody is known as {who!r}"
+    told = f"no host or fleet is known as {who!r}"
     fix = f"known are: {known or 'none'}; a host that is not can be named by its whole key"
     raise PeerRefused(Problem("PEER_UNKNOWN", told, fix=fix))
 

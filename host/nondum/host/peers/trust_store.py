@@ -1,6 +1,6 @@
-"""Keeps who this host is to its peers, and whom it trusts, in `<state>/peers/`.
+"""Stores the identity that this host has for its peers, and its trust, in `<state>/peers/`.
 
-    host.key      its own key pair, made at the first start; nobody else may read it
+    host.key      its own key pair, made at the first start; no other user may read it
     trust.json    fleets, paired hosts and revoked keys
     certificate   what a fleet has signed for it, if one has
 
@@ -72,7 +72,7 @@ class PeerTrustStore:
             certificate = await asyncio.to_thread(_read_certificate, folder / CERTIFICATE_NAME)
         except OSError as error:
             raise PeerRefused(_disk(folder, error)) from error
-        keeper = cls(
+        trust_store = cls(
             folder,
             HostPublic(keys.public, name),
             keys,
@@ -81,8 +81,8 @@ class PeerTrustStore:
             on_certificate=on_certificate,
             clock=clock,
         )
-        keeper._show_kept(certificate)
-        return keeper
+        trust_store._show_kept(certificate)
+        return trust_store
 
     @property
     def key(self) -> PeerKey:
@@ -101,14 +101,14 @@ class PeerTrustStore:
         await self._extend(lambda trust: trust.with_paired(key, name))
 
     async def trust_fleet(self, fleet: FleetPublic) -> None:
-        """Let in whoever the fleet certifies. Raises `PeerRefused` (PEERS_FOLDER)."""
+        """Let in the hosts that a fleet certifies. Raises `PeerRefused` (PEERS_FOLDER)."""
         await self._extend(lambda trust: trust.with_fleet(fleet.key, fleet.name))
 
     async def revoke(self, key: PeerKey, why: str) -> None:
         """Never let in a key again; a peer that is here under it is cut now.
 
         Raises `PeerRefused` (KEY_OWN, PEERS_FOLDER); with the latter, it holds until the host is
-        started anew.
+        restarted.
         """
         if key == self.key:
             told = "this is the host's own key"
@@ -127,8 +127,8 @@ class PeerTrustStore:
     async def certify(self, data: bytes) -> Certificate:
         """Show peers this certificate from now on: a person gave it.
 
-        It lets this host in elsewhere and nobody in here, so the fleet that signed it need not be
-        trusted. Raises `PeerRefused` (CERTIFICATE_…, PEERS_FOLDER).
+        Other hosts let this host in by it; this host lets no host in by it, so it need not trust
+        the fleet that signed it. Raises `PeerRefused` (CERTIFICATE_…, PEERS_FOLDER).
         """
         found = certificates.parse(data)
         self._check(found)
@@ -140,9 +140,9 @@ class PeerTrustStore:
     async def offer(self, data: bytes) -> Certificate | None:
         """Take a certificate that lay on a drive, where it is this host's and of use; else None.
 
-        Nobody vouches for a drive: it must not put a stranger's certificate in the place of one
-        that opens doors. So it is taken where there is none that holds, or from the same fleet,
-        for longer. Raises `PeerRefused` (PEERS_FOLDER).
+        A drive proves nothing: it must not replace a certificate that peers accept by a
+        stranger's. So its certificate is taken only where no valid one is held, or if it is of
+        the same fleet and valid for longer. Raises `PeerRefused` (PEERS_FOLDER).
         """
         try:
             found = certificates.parse(data)
@@ -173,13 +173,13 @@ class PeerTrustStore:
                     "the certificate calls this host by another name",
                     need=self.host.name,
                     have=found.host,
-                    fix="have it signed anew, or change `name` under [host]",
+                    fix="have it signed again, or change `name` under [host]",
                 )
             )
         certificates.verify(found, {found.fleet}, self._clock())
 
     def _is_better(self, found: Certificate) -> bool:
-        """Whether what a drive brought opens more doors than what is held."""
+        """Whether the certificate of a drive is to replace the one that is held."""
         held = self.certificate
         if held is None:
             return True

@@ -12,7 +12,7 @@ from nondum.planning.pddl.facts import predicate_of
 
 
 def uses_of(running: Iterable[RunningBehaviour]) -> frozenset[str]:
-    """The facts that this host's own behaviours take of its own components."""
+    """The facts about this host's components that its running behaviours make false."""
     return frozenset(
         text
         for run in running

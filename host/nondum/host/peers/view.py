@@ -135,7 +135,7 @@ class PeersView:
             "peer": name or next((hint.name for hint in hints), ""),
             "fingerprint": _print_of(key),
             "state": "here" if peer else "away",
-            "standing": self._standing(key),
+            "standing": self._trust_state(key),
             "announced": [
                 {
                     "by": hint.source.value,
@@ -154,10 +154,10 @@ class PeersView:
             "revision": peer.revision if peer else None,
         }
 
-    def _standing(self, key: PeerKey) -> str:
+    def _trust_state(self, key: PeerKey) -> str:
         if self._security is Security.DEVELOPMENT:
             return "needs no key"
-        return self._trust().standing(key).value
+        return self._trust().state_of(key).value
 
     def _of(self, key: PeerKey) -> _Past:
         if key not in self._past and len(self._past) >= MOST_KEPT:

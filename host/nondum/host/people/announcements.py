@@ -108,7 +108,7 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             name = _name(event.payload, snapshot)
             return f"{name} goes on without trust: {_joined(problems)}"
         case TrustChanged():
-            told = f"whom {event.owner} trusts has changed: version {event.version}"
+            told = f"the trust file of {event.owner} has changed: version {event.version}"
             return f"{told}, from {event.source}"
         case ClockDoubted():
             return _joined(event.problems)
@@ -155,12 +155,12 @@ def _lower_version(new: PayloadRecord, snapshot: Snapshot) -> str:
     for old in snapshot.payloads:
         is_before = old.payload_id == new.payload_id and old.release == new.was < new.release
         if is_before and Version(new.version) < Version(old.version):
-            return f", though its version is lower: {old.version} was in force"
+            return f", though its version is lower: {old.version} was active"
     return ""
 
 
 def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str | None:
-    new, old = _record(event.payload, snapshot), _in_force(event.payload, snapshot)
+    new, old = _record(event.payload, snapshot), _active_release(event.payload, snapshot)
     if new is None or new.step not in (Step.STORED, Step.PROBED):
         return None
     if old is not None:
@@ -172,12 +172,12 @@ def _brought_up(event: WheelsStored | PayloadResumed, snapshot: Snapshot) -> str
 
 def _stays(key: str, snapshot: Snapshot) -> str:
     """What goes on instead of a release that fails."""
-    old = _in_force(key, snapshot)
+    old = _active_release(key, snapshot)
     return f", {old.version} (release {old.release}) stays" if old is not None else ""
 
 
-def _in_force(key: str, snapshot: Snapshot) -> PayloadRecord | None:
-    """The release that is in force of the payload that another one is of."""
+def _active_release(key: str, snapshot: Snapshot) -> PayloadRecord | None:
+    """The active release of the payload that `key` is another release of."""
     payload = _record(key, snapshot)
     return next(
         (

@@ -16,7 +16,7 @@ LONGEST = 160
 """Characters of an answer; what is longer is for reading."""
 
 _LENGTHS = ((6, 2), (5, 1), (4, 1), (3, 1), (2, 1), (1, 1), (3, 0), (2, 0), (1, 0))
-"""So many things that can be done, and that are missing, are tried to be named."""
+"""How many abilities and how many missing things an answer names: pairs, the longest first."""
 _NOTHING = "I can do nothing yet"
 
 
@@ -60,7 +60,7 @@ def activity(
     >>> activity([{**goal, "state": "suspended", "needs": [image]}], [])
     'I was asked to follow you, but for that I need an image.'
     >>> activity([], [])
-    'I do nothing: nobody has asked for anything.'
+    'I do nothing: no one has asked for anything.'
     """
     open_goals = [goal for goal in given if goal["state"] in _URGENCY]
     first = min(open_goals, key=lambda goal: _URGENCY.index(goal["state"]), default=None)
@@ -69,7 +69,7 @@ def activity(
     beside = [lent_out, _coming(coming), f"{_goals(more)} waiting" if more > 0 else ""]
     ends = "".join(f"; {words}" for words in beside if words)
     if first is None:
-        why = lent_out or _coming(coming) or "nobody has asked for anything"
+        why = lent_out or _coming(coming) or "no one has asked for anything"
         return f"I do nothing{' of my own' if lent_out else ''}: {why}."
     told = [f"{words}{end}." for end in (ends, "") for words in _pursued(first, steps)]
     return next((s for s in told if len(s) <= LONGEST), _cut(told[-1]))

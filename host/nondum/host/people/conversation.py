@@ -1,8 +1,8 @@
-"""What people are told is spoken, and what they say is heard, by components that can do that.
+"""Components that can speak say the announcements, and components that can listen hear people.
 
 A sentence that is heard is a question to the robot about itself, or else a goal in words, as if it
-had been typed; it is never translated, for nobody is asked to confirm it. Who listens is told what
-can be said, and again when that changes.
+had been typed; it is never translated, since no person is asked to confirm it. Components that
+listen are sent the sentences that can be said, and again when these change.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nondum.sdk.errors import GoalRefused
 SPEAK_S = 30.0
 """What a component has to say a sentence; then the next one is said."""
 UNSAID = 3
-"""So many sentences may wait to be said: who lags behind hears the newest."""
+"""The number of sentences that may wait to be said: older ones are left out."""
 LONGEST_SPOKEN = 160
 """A longer sentence is for reading."""
 PAUSE_S = 0.2
@@ -88,8 +88,9 @@ class Conversation:
                 for task in late:
                     task.cancel()
 
-    async def heard(self, component: str, words: str) -> None:
-        """Answer or want what a person has said; tell people where that cannot be."""
+    async def on_words(self, component: str, words: str) -> None:
+        """Answer what a person has said, or take it as a goal; announce why if neither is
+        possible."""
         try:
             if await self._answer(words) is not None:
                 return
@@ -150,7 +151,7 @@ class Conversation:
             words = (await plugin.listen() or {}).get("words")
             if not isinstance(words, str) or not words.strip():
                 return
-            await self.heard(component, words)
+            await self.on_words(component, words)
             await asyncio.sleep(PAUSE_S)
 
 

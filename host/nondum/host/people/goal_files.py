@@ -1,8 +1,8 @@
-"""Goals that payloads bring: given when a payload comes into force, and over when it is withdrawn.
+"""Goals that payloads bring: given when a payload becomes active, ended when it is withdrawn.
 
 Words that mean nothing yet, since the payload that knows them is not here, are tried again with
-every recomposition; so are words that people have had kept. A daemon that starts gives those of
-payloads anew, as it brings up anew what is plugged in.
+every recomposition; so are words that people have had kept. A daemon that starts gives the goals
+of payloads again when it activates the payloads again.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from typing import Any, TypeAlias
 
 from nondum.host.core.elsewhere import Elsewhere
 from nondum.host.core.events import Emit, Event, GoalEnded, HostStarted, PayloadActivated
-from nondum.host.core.feedback_state import Concern, State
+from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.core.records import GoalRecord, Snapshot, Step
 from nondum.host.core.status import coming_in
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.translation import Understood
 from nondum.host.people.conversation import given_goal
-from nondum.host.people.feedback.concerns import refusal
+from nondum.host.people.feedback.state_reasons import refusal
 from nondum.sdk.errors import GoalRefused, Problem
 
 log = logging.getLogger(__name__)
 
 WITHDRAWN = "the payload that wants it is withdrawn"
-_ANEW = "it is given anew with its payload"
+_GIVEN_AGAIN = "its payload gives it again"
 
 Translate: TypeAlias = Callable[[str, GoalRefused], Awaitable[Understood]]
 """Words, and why they match no phrase → what components take them to mean."""
@@ -75,7 +75,7 @@ class GoalFiles:
         on_change: Callable[[], None] = lambda: None,
         elsewhere: Elsewhere | None = None,
     ) -> None:
-        """`on_change` is called when there are other `concerns`; words of people may be goals of
+        """`on_change` is called when `state_reasons` change; words of people may be goals of
         peers, `elsewhere`."""
         self._snapshot, self._mind, self._translate = snapshot, mind, translate
         self._emit, self._on_change = emit, on_change
@@ -89,7 +89,7 @@ class GoalFiles:
         self._news = asyncio.Event()
 
     @property
-    def concerns(self) -> tuple[Concern, ...]:
+    def state_reasons(self) -> tuple[StateReason, ...]:
         """What cannot be wanted as things are."""
         return tuple(
             refusal(
@@ -118,7 +118,7 @@ class GoalFiles:
         if isinstance(event, HostStarted):
             for goal in self._snapshot().goals:
                 if goal not in of_people([goal]):
-                    self._emit(GoalEnded(goal.id, _ANEW))
+                    self._emit(GoalEnded(goal.id, _GIVEN_AGAIN))
         if event.JOURNALLED and self._wishes:
             self._end_withdrawn()
             coming, self._coming = self._coming, coming_in(self._snapshot())
@@ -192,7 +192,7 @@ class GoalFiles:
         """Give a peer what a person wants of it, now that it is here. Raises `GoalRefused`."""
         if self._elsewhere is None or wish.payload:
             return False
-        peer, words = await self._elsewhere.whose(wish.words)
+        peer, words = await self._elsewhere.addressee(wish.words)
         if peer is None or not self._is_wished(wish):
             return False
         given = await self._elsewhere.give(peer, words, wish.priority)

@@ -17,7 +17,7 @@ from nondum.planning.words.phrases import Phrasebook
 from nondum.planning.words.stop_words import STOP_PATTERNS, stop_patterns
 
 SAYINGS_BYTES = 40_000
-"""What a packet to a worker has room for, and some to spare."""
+"""Most bytes of sayings: they fit into one packet to a worker, with a margin."""
 
 ADDRESSEE = "addressee"
 """Slot for the name of the host that is spoken to."""
@@ -31,8 +31,8 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
 
     These come first, then what it is asked about itself. Slots are called by the
     types of what they name. A phrase without a name for one of its slots cannot be said. Each of
-    the `hosts` can be addressed first, and stopped with its name behind the word, too. What a
-    packet has no room for is left out, names first.
+    the `hosts` can be addressed first, and stopped with its name behind the word, too. What does
+    not fit into a packet is left out, names first.
     """
     names: dict[str, list[str]] = {}
     addressee = f"[{{{ADDRESSEE}}}] " if hosts else ""

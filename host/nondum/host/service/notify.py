@@ -27,7 +27,7 @@ def encode(**fields: str) -> bytes:
 
 
 class Notifier:
-    """Tells the service manager that asked for it; nobody, where none has. `close` it."""
+    """Tells the service manager how the daemon is, if one asked for that. `close` it."""
 
     def __init__(self, address: str = "", watchdog_s: float | None = None) -> None:
         """`address` is a path, or `@` and an abstract name."""
@@ -65,7 +65,7 @@ class Notifier:
         self._tell(STATUS=words[:LONGEST_STATUS])
 
     def starting(self, more_s: float) -> None:
-        """It is still starting, and has so many seconds more for that, from now on."""
+        """It is still starting, and may take `more_s` seconds more from now on."""
         self._tell(EXTEND_TIMEOUT_USEC=str(round(more_s * 1e6)))
 
     def stopping(self) -> None:

@@ -20,7 +20,7 @@ SIGNS = 4
 STARTING_S = 20.0
 """Between two signs of a start that goes on."""
 LONGEST_START_S = 600.0
-"""A start that takes longer has failed: nobody asks for more time."""
+"""A start that takes longer has failed: the daemon asks for no more time."""
 BETWEEN_WORDS_S = 1.0
 """The status is told no more often."""
 

@@ -108,7 +108,7 @@ def _read_own(path: Path) -> tuple[SignedFile, int]:
         with path.open("rb") as opened:
             status = os.fstat(opened.fileno())
             if status.st_mode & _OTHERS_WRITE or status.st_uid not in (0, os.geteuid()):
-                raise TrustRefused(_open_to_others(path, status))
+                raise TrustRefused(_writable_by_other_users(path, status))
             return _signed(path, opened), status.st_uid
     except OSError as error:
         if isinstance(error, FileNotFoundError) and error.filename == str(path):
@@ -128,7 +128,7 @@ def _signed(path: Path, opened: BinaryIO) -> SignedFile:
     return SignedFile(data, signed, str(path))
 
 
-def _open_to_others(path: Path, status: os.stat_result) -> Problem:
+def _writable_by_other_users(path: Path, status: os.stat_result) -> Problem:
     return Problem(
         "TRUST_OPEN_TO_OTHERS",
         "others can change this file, so it does not say which keys to trust",

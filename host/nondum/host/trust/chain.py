@@ -1,5 +1,5 @@
-"""The trust files of a host, from the first one to the one that is in force, as they lie on its
-disk; what child processes do with them.
+"""The trust files of a host, from the first one to the active one, as they lie on its disk; what
+child processes do with them.
 
     /etc/nondum/trust.toml            the first one, and its signatures: see `anchors`
     <state>/trust/00000004.toml       each that followed, by its version
@@ -30,7 +30,7 @@ Arguments = Mapping[str, Any]
 
 
 def load(arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Follow the chain in `folder` from its first file, `anchor`: the `text` in force (None: nobody
+    """Follow the chain in `folder` from its first file, `anchor`: the active `text` (None: no key
     is trusted), the `origin` of the first file, the digests `known` and the `problems` on the way.
     """
     folder = Path(arguments["folder"])
@@ -48,10 +48,10 @@ def load(arguments: Arguments, report: Report) -> dict[str, Any]:
 
 
 def extend(arguments: Arguments, report: Report) -> dict[str, Any]:
-    """Take from the files `offered` (see `packed`) those that follow the `trust` in force, and keep
+    """Take from the files `offered` (see `packed`) those that follow the active `trust`, and keep
     them in `folder`: as `load`, with `taken`, the versions.
 
-    Raises `InstallFailed` (DISK_FULL, …); then the trust in force stays.
+    Raises `InstallFailed` (DISK_FULL, …); then the active trust stays.
     """
     folder, known = Path(arguments["folder"]), list(arguments["known"])
     offered = unpacked(arguments["offered"])

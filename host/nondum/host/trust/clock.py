@@ -20,7 +20,7 @@ def _utc() -> datetime:
 
 
 class ClockWatch:
-    """Compares the clock with what is certainly past, by the trust file in force."""
+    """Compares the clock with what is certainly past, by the active trust file."""
 
     def __init__(
         self, trust: Callable[[], Trust | None], emit: Emit, now: Callable[[], datetime] = _utc

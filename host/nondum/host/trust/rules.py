@@ -22,7 +22,7 @@ class Rules:
     host: str
     allow_unsigned: bool
     trust: str | None = None
-    """Text of the trust file that is in force; None: nobody is trusted."""
+    """Text of the active trust file; None: no key is trusted."""
 
     def to_arguments(self) -> dict[str, Any]:
         """The rules among a job's arguments."""
@@ -35,7 +35,7 @@ class Rules:
         return cls(arguments.get("host", ""), allow_unsigned, arguments.get("trust"))
 
     def following(self, known: Sequence[str], offered: Sequence[SignedFile]) -> Rules:
-        """The rules as they will be once the files that follow the one in force are taken."""
+        """The rules as they will be once the files that follow the active one are taken."""
         if self.trust is None or not offered:
             return self
         accepted = succession.extend(parsed(self.trust), known, offered).accepted

@@ -28,7 +28,7 @@ class Judged:
     """What merging a payload alone shows."""
 
     problems: tuple[Problem, ...]
-    """Why a host would keep its components out of the plan, phrases that nobody could say, and
+    """Why a host would keep its components out of the plan, phrases that no one could say, and
     inputs that no stream could fit."""
     warnings: tuple[Problem, ...]
 
@@ -48,7 +48,7 @@ def judge(index: Mapping[str, PluginDescription]) -> Judged:
 
 
 def _wrong_slots(index: Mapping[str, PluginDescription], merged: Merged) -> Iterator[Problem]:
-    """Optional inputs, and what outputs are of, whose types nobody declares. No plan asks for
+    """Optional inputs, and what outputs are of, whose types no fragment declares. No plan asks for
     them, so planning would not miss them: the input would be left without a stream, unseen."""
     graph = merged.domain.types
     for component, description in index.items():
@@ -66,7 +66,7 @@ def _wrong_slots(index: Mapping[str, PluginDescription], merged: Merged) -> Iter
 
 
 def _own_words(merged: Merged) -> Iterator[Problem]:
-    """Types and predicates that only this payload knows: nobody else can plan with them."""
+    """Types and predicates that only this payload knows: no other payload can plan with them."""
     types = core_graph().parents.keys()
     own_types = {name for name in merged.domain.type_origins if name not in types}
     predicates = core_predicates()
@@ -79,7 +79,7 @@ def _warned(kind: str, own: Collection[str], core: Collection[str]) -> Iterator[
     for name in sorted(own):
         near = difflib.get_close_matches(name, core, n=1)
         yield Problem(
-            "W-OWN-WORD",
+            "PDDL_OWN_WORD",
             f"{kind} {name!r} is in no other fragment that is known here",
             where=name,
             fix=f"the nearest word of nondum-core is {near[0]!r}"

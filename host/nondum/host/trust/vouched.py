@@ -22,7 +22,7 @@ class Vouched:
         return age_s(self.built)
 
 
-NOBODY = Vouched()
+UNVOUCHED = Vouched()
 CLOCKS_DIFFER_S = 60.0
 """So far clocks may be apart."""
 

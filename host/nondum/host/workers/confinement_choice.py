@@ -13,7 +13,7 @@ from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse.format.confinement import Level
 
 
-def standing(
+def confinement_state(
     wanted: Wanted, minimum: Level, kept_in: Path | None = None, place: Path | None = None
 ) -> ConfinementState:
     """The level to run at: the best one, or the one that is `wanted`. Blocks, see `probe.findings`.
@@ -49,4 +49,4 @@ def confinement(found: ConfinementState, places: tuple[Path, ...]) -> Confinemen
 
 def best() -> Level:
     """The best level that the one who asks could have here. Blocks, see `probe.findings`."""
-    return standing("auto", Level.NONE).level
+    return confinement_state("auto", Level.NONE).level

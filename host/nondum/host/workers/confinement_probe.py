@@ -44,7 +44,7 @@ def findings(kept_in: Path | None = None, place: Path | None = None) -> tuple[Fi
     if kept_in is not None and (kept := _kept(kept_in, key)) is not None:
         return kept
     found = tuple(_until_available(_each(place)))
-    if kept_in is not None and not _is_helper_at_fault(found):
+    if kept_in is not None and not _shares_users_despite_helper(found):
         _keep(kept_in, key, found)
     return found
 
@@ -61,7 +61,7 @@ def _until_available(each: Iterator[Finding]) -> Iterator[Finding]:
             return
 
 
-def _is_helper_at_fault(found: tuple[Finding, ...]) -> bool:
+def _shares_users_despite_helper(found: tuple[Finding, ...]) -> bool:
     """Whether workers share a user although the helper is there: it may do better next time."""
     has_helper = os.geteuid() != 0 and bool(privileged().users)
     return has_helper and not any(finding.has_users for finding in found)
@@ -71,15 +71,15 @@ def _each(place: Path | None) -> Iterator[Finding]:
     if not refusals.is_known(refusals.machine()):
         log.warning("system calls cannot be filtered on %s", refusals.machine())
     bwrap = bubblewrap.program()
-    yield visibility.MISSING if bwrap is None else _rooms(bwrap, place)
+    yield visibility.MISSING if bwrap is None else _sandboxed(bwrap, place)
     if not landlock.version():
         yield visibility.failed(Level.RESTRICTED, "the kernel has no Landlock")
     else:
         yield _tried(Held(), place)
 
 
-def _rooms(bwrap: str, place: Path | None) -> Finding:
-    """With a user for each worker, if that can be had."""
+def _sandboxed(bwrap: str, place: Path | None) -> Finding:
+    """Level `sandboxed`, with a separate user for each worker where that is possible."""
     if not privileged().users:
         why = "only root, or the helper of the service, can give each its own"
         return visibility.sharing(_tried(Boxed(bwrap), place), why)
@@ -87,9 +87,7 @@ def _rooms(bwrap: str, place: Path | None) -> Finding:
     if own.has_users:
         return own
     # Whether files can be shown as those of another user is a matter of their file system.
-    return visibility.sharing(
-        _tried(Boxed(bwrap)), f"of their own they cannot be had: {own.reason}"
-    )
+    return visibility.sharing(_tried(Boxed(bwrap)), f"separate ones are not possible: {own.reason}")
 
 
 def _tried(confinement: Confinement, place: Path | None = None) -> Finding:

@@ -43,16 +43,16 @@ INSTRUMENTS = (
     *("/dev/pts", "/dev/bus/usb", "/dev/ttyUSB*", "/dev/ttyACM*", "/dev/video*"),
     *("/dev/hidraw*", "/dev/i2c-*", "/dev/spidev*", "/dev/gpiochip*", "/dev/media*"),
 )
-"""Where no room can be made for a worker, what one that declares devices may open."""
+"""Where no sandbox can be made for a worker, what one that declares devices may open."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
     """How one interpreter becomes one worker."""
 
-    walls: Mapping[str, Any]
+    restrictions: Mapping[str, Any]
     """See `nondum.host.sandbox.inside.restrict`."""
-    room: Mapping[str, Any] | None = None
+    mounts: Mapping[str, Any] | None = None
     """See `nondum.host.sandbox.inside.mounts`; None: it stays where it is."""
     ruleset: int | None = None
     """Landlock's, by descriptor."""
@@ -62,19 +62,19 @@ class Entry:
     @property
     def maps_scratch(self) -> bool:
         """Whether its scratch folder stays the host's, and is shown as that user's."""
-        return self.room is not None and bool(self.room["maps_scratch"])
+        return self.mounts is not None and bool(self.mounts["maps_scratch"])
 
 
 class Confinement(Protocol):
     """One level's way to hold workers."""
 
     level: Level
-    has_keeper: bool
+    has_init: bool
     """Whether its interpreter is process 1 of a namespace, and hears orders as long as it runs."""
     has_users: bool
     """Whether its interpreter is in a namespace whose users are mapped from outside."""
     without: frozenset[str]
-    """Walls that are left out, so that each can be seen to matter; none, outside tests."""
+    """Restrictions that are left out, so that tests see that each matters; otherwise none."""
 
     def ground(self, spec: WorkerSpec | None) -> Ground:
         """What a worker's interpreter is started with, or that of a spare, of any worker."""
@@ -99,7 +99,7 @@ class Unconfined:
     have."""
 
     level = Level.NONE
-    has_keeper = False
+    has_init = False
     has_users = False
     without: frozenset[str] = frozenset()
 
@@ -120,15 +120,15 @@ class Unconfined:
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
         """Only making what other users would run or open is given up, where the kernel has that."""
         refused = calls_refused(refusals.AT_LEAST, self.without) if refusals.has_filters() else None
-        walls = {"user": None, "keeps_capabilities": True, "filter": refused}
-        yield Entry({**walls, "may_gain_privileges": False})
+        restrictions = {"user": None, "keeps_capabilities": True, "filter": refused}
+        yield Entry({**restrictions, "may_gain_privileges": False})
 
 
 class Held:
     """Level `restricted`: the worker stays on the host and gives up what it can of it."""
 
     level = Level.RESTRICTED
-    has_keeper = False
+    has_init = False
     has_users = False
 
     def __init__(self, *, without: Collection[str] = (), abi: int | None = None) -> None:
@@ -148,7 +148,7 @@ class Held:
 
     @contextlib.contextmanager
     def entry(self, spec: WorkerSpec, ground: Ground) -> Iterator[Entry]:
-        """Files by Landlock, calls by a filter, and a user of its own if the host is root."""
+        """Files by Landlock, calls by a filter, and a separate user if the host is root."""
         has_network = "network" in spec.permissions
         groups = {
             **refusals.GROUPS,
@@ -160,7 +160,7 @@ class Held:
             groups |= refusals.WITH_THE_HOSTS_USER
             groups |= refusals.TRUNCATION if self._abi < landlock.TRUNCATES else {}
         nodes = (*(_instruments() if spec.index.devices else ()), *_nodes(spec))
-        walls = {
+        restrictions = {
             "user": user,
             "groups": sorted(_groups_of(nodes)),
             "keeps_capabilities": "capabilities" in self.without,
@@ -168,7 +168,7 @@ class Held:
             "filter": calls_refused(groups, self.without),
         }
         if "landlock" in self.without or not self._abi:
-            yield Entry(walls, user=user)
+            yield Entry(restrictions, user=user)
             return
         with landlock.ruleset(
             readable=(*spec.site_packages, *bubblewrap.prefixes(), *_more_files(spec)),
@@ -177,14 +177,14 @@ class Held:
             has_network=has_network,
             abi=self._abi,
         ) as ruleset:
-            yield Entry(walls, ruleset=ruleset, user=user)
+            yield Entry(restrictions, ruleset=ruleset, user=user)
 
 
 class Boxed:
-    """Level `sandboxed`: a room of its own, made by bubblewrap."""
+    """Level `sandboxed`: a separate sandbox for each worker, made by bubblewrap."""
 
     level = Level.SANDBOXED
-    has_keeper = True
+    has_init = True
 
     def __init__(
         self,
@@ -195,8 +195,8 @@ class Boxed:
         without: Collection[str] = (),
     ) -> None:
         """`places` are folders in which most workers' code and scratch are: a spare sees them until
-        it becomes one. With `has_users`, which takes root or the helper, each worker is a user of
-        its own.
+        it becomes one. With `has_users`, which takes root or the helper, each worker is a
+        separate user.
         """
         self._bwrap, self._places = bwrap, places
         self.has_users, self._users = has_users, Users(privileged().users)
@@ -249,15 +249,15 @@ class Boxed:
             "user": user,
             "groups": sorted(_groups_of(nodes)) if os.geteuid() == 0 else None,
             "changes_user": "user" not in kept,
-            "keeper_filter": calls_refused(refusals.GROUPS, mounts_too),
+            "init_filter": calls_refused(refusals.GROUPS, mounts_too),
         }
-        walls = {
+        restrictions = {
             "user": None,
             "keeps_capabilities": "capabilities" in kept,
             "may_gain_privileges": "new privileges" in kept,
             "filter": calls_refused(groups, kept),
         }
-        yield Entry(walls, room=given, user=user)
+        yield Entry(restrictions, mounts=given, user=user)
 
     def _user(self, spec: WorkerSpec) -> int | None:
         """The worker's own, unless its code is root's alone, by the umask of who installed it."""
@@ -320,7 +320,7 @@ def _interpreter(ground: Ground, orders: int) -> list[str]:
 
 
 def calls_refused(groups: Mapping[str, tuple[Rule, ...]], without: Collection[str]) -> str | None:
-    """The filter for `walls`; None where there is none to be had, or it is left out."""
+    """The system call filter; None where there is none to be had, or it is left out."""
     machine = refusals.machine()
     if "filter" in without or not refusals.is_known(machine):
         return None

@@ -1,7 +1,7 @@
 """Devices of the machine that belong to a worker's own user for as long as it has them.
 
 As login(1) does with terminals: only a node's owner and group may open it, and a worker that is a
-user of its own is neither. Takes root: elsewhere the helper has made a node for that user.
+separate user is neither. Takes root: elsewhere the helper has made a node for that user.
 """
 
 from __future__ import annotations

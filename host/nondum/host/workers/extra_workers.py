@@ -39,12 +39,12 @@ class ExtraWorkers:
     def beside(self, component: str, payload: str) -> Supervisor | None:
         """That which may take over for a component."""
         found = self.get(component, payload)
-        return found if found is not None and found.standing is Role.BESIDE else None
+        return found if found is not None and found.role is Role.BESIDE else None
 
     async def left(self, component: str) -> None:
         """Wait until those that stood for a component have ended; somebody else stops them."""
         await self._ended(
-            o for o in self if o.spec.component == component and o.standing is Role.LEAVING
+            o for o in self if o.spec.component == component and o.role is Role.LEAVING
         )
 
     async def released(self, node: str) -> None:

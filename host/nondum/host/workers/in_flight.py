@@ -22,7 +22,7 @@ from nondum.host.workers.worker import Worker
 EXPLAINED = 3
 """Of a worker that works: what is under way to each of its streams' ends."""
 FEW = 64
-"""So many, beyond what its streams explain, hold up nothing."""
+"""Descriptors that hold up nothing, beyond what its streams explain."""
 MOST_IN_ONE = 253
 """Descriptors in one packet (SCM_MAX_FD)."""
 PAUSE_S = 0.2
@@ -79,7 +79,7 @@ def _sockets(pid: int) -> Iterator[tuple[int, int]]:
 
 
 def _nowhere_open(pid: int, known: Collection[int]) -> int:
-    """How many unix sockets of a network namespace of its own no process of a worker has open."""
+    """How many unix sockets in its separate network namespace no process of a worker has open."""
     try:
         if Path(f"/proc/{pid}/ns/net").stat().st_ino == Path("/proc/self/ns/net").stat().st_ino:
             return 0
@@ -110,8 +110,8 @@ class Search:
         worker.gone.add_done_callback(lambda _: self._workers.discard(worker))
 
     def begin(self, count: int = 1) -> None:
-        """Descriptors could not be sent, so many times: look who keeps them under way, unless that
-        is being done, or was just done."""
+        """Descriptors could not be sent, `count` times: look which worker keeps them under way,
+        unless that is being done, or was just done."""
         self.refusals += count
         if self._running is None or self._running.done():
             self._running = asyncio.create_task(self._run())

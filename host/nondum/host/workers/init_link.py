@@ -1,6 +1,6 @@
-"""The host's end of the socket at which the keeper of a worker's room hears.
+"""The host's end of the socket at which the init of a worker's sandbox takes orders.
 
-The keeper is process 1 of the room and runs `nondum.host.sandbox.inside.init`; the worker can make
+The init is process 1 of the sandbox and runs `nondum.host.sandbox.inside.init`; the worker can make
 it slow, so nothing waits for it without a limit.
 """
 
@@ -30,7 +30,7 @@ CREDENTIALS = struct.Struct("=iII")
 
 @dataclass(frozen=True, slots=True)
 class OpenFiles:
-    """What the processes of a room have open."""
+    """What the processes of a sandbox have open."""
 
     descriptors: int
     """Of the one that has most."""
@@ -60,7 +60,7 @@ class InitLink:
         return self._worker
 
     async def grant(self, need: str, node: str, own: str) -> None:
-        """Have a device appear in the room, at `node_of`, and a link to it where it is outside.
+        """Have a device appear in the sandbox, at `node_of`, and a link to it where it is outside.
 
         Raises `WorkerFailed` (DEVICE_REFUSED).
         """
@@ -80,9 +80,9 @@ class InitLink:
         await self._ask({"do": "revoke", "need": need})
 
     async def open_files(self) -> OpenFiles:
-        """What the room's processes have open.
+        """What the processes of the sandbox have open.
 
-        A worker may keep its keeper from answering: again and again, that counts as too much.
+        A worker may keep its init from answering: again and again, that counts as too much.
         """
         answer = await self._ask({"do": "look"})
         if answer["error"]:
@@ -92,8 +92,8 @@ class InitLink:
         return OpenFiles(answer["descriptors"], answer["deleted_bytes"])
 
     def take_pidfd(self) -> int | None:
-        """The keeper's own process, for the caller to wait for and close; None if it is gone, never
-        said who it is, or cannot be watched. It ends last: all in its room has ended before."""
+        """A pidfd of the init, for the caller to wait for and close; None if it is gone, never said
+        who it is, or cannot be watched. The init ends last, after all else in the sandbox."""
         taken, self._pidfd = self._pidfd, None
         return taken
 
@@ -116,11 +116,11 @@ class InitLink:
                 return {"error": str(error) or f"no answer for {ANSWER_S:g} s"}
 
     def _read(self) -> None:
-        room_for_credentials = socket.CMSG_SPACE(CREDENTIALS.size)
+        ancillary_bytes = socket.CMSG_SPACE(CREDENTIALS.size)
         with contextlib.suppress(BlockingIOError):
             while True:
                 try:
-                    data, more, _, _ = self._orders.recvmsg(_ANSWER_BYTES, room_for_credentials)
+                    data, more, _, _ = self._orders.recvmsg(_ANSWER_BYTES, ancillary_bytes)
                 except ConnectionError:
                     data, more = b"", []
                 if not data:
@@ -130,7 +130,7 @@ class InitLink:
 
     def _hear(self, said: dict[str, Any], more: list[tuple[int, int, bytes]]) -> None:
         match said["is"]:
-            case "keeper":
+            case "init":
                 # It has ended meanwhile, or no descriptor is left. It is not tried again later: by
                 # then its id may be somebody else's, whose end would be waited for.
                 with contextlib.suppress(OSError):
@@ -147,10 +147,10 @@ def _sender(more: list[tuple[int, int, bytes]]) -> int:
 
 
 def node_of(need: str) -> str:
-    """Where a worker finds the device for a need in its room."""
+    """Where a worker finds the device for a need in its sandbox."""
     return f"{DEVICES}/{need}"
 
 
 def _real(node: str) -> str:
-    """Without links: they would lead elsewhere in the room."""
+    """Without links: they would lead elsewhere in the sandbox."""
     return os.path.realpath(node)

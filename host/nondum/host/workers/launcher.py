@@ -20,7 +20,7 @@ from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers import problems, scratch
 from nondum.host.workers.confinements import Confinement, Entry, Unconfined
 from nondum.host.workers.process import WorkerProcess
-from nondum.host.workers.spare import ROOM, ROOM_BYTES, Spare
+from nondum.host.workers.spare import PLACEHOLDER, PLACEHOLDER_BYTES, Spare
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.sdk.errors import Problem, WorkerFailed
 from nondum.wheelhouse.format.confinement import Level
@@ -144,12 +144,12 @@ def owner_mark(scratches: Path) -> str:
 
 
 def parameters(spec: WorkerSpec, entry: Entry, *, looks: bool = False) -> dict[str, Any]:
-    """What `bootstrap.py` is told; who `looks` only tells what it sees, and ends.
+    """The parameters of `bootstrap.py`; a process that `looks` only reports what it sees, and ends.
 
-    Raises `OSError` when the mark finds no room.
+    Raises `OSError` when the mark is too long for its placeholder.
     """
     mark = f"{MARK}={spec.scratch}"
-    if len(os.fsencode(mark)) >= ROOM_BYTES:
+    if len(os.fsencode(mark)) >= PLACEHOLDER_BYTES:
         raise OSError(f"the path of the scratch folder is too long: {spec.scratch}")
     return {
         "component": spec.component,
@@ -160,9 +160,9 @@ def parameters(spec: WorkerSpec, entry: Entry, *, looks: bool = False) -> dict[s
         "scratch": str(spec.scratch),
         "environment": _environment(spec),
         "mark": mark,
-        "room_for_mark": ROOM,
-        "room": entry.room,
-        "walls": entry.walls,
+        "mark_placeholder": PLACEHOLDER,
+        "mounts": entry.mounts,
+        "restrictions": entry.restrictions,
         "looks": looks,
     }
 

@@ -47,7 +47,7 @@ class Logs:
         self._next = asyncio.Event()
 
     def of(self, component: str, after: int = 0) -> tuple[LogLine, ...]:
-        """The lines of a component that came after so many of all, oldest first."""
+        """The lines of a component that came after the first `after` of all, oldest first."""
         ring = self._rings.get(component, ())
         return tuple(line for number, line in ring if number > after)
 

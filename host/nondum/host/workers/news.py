@@ -26,7 +26,7 @@ MAX_WORD = 256
 
 MAX_COUNT = 2**31
 MAX_RATE_HZ = 1e6
-"""Messages a second; no worker gets so many through."""
+"""Messages a second; no worker can send as many."""
 MAX_TEXT = 16 * 1024
 """Characters of one message that are kept."""
 MAX_REASON = 1000
@@ -125,7 +125,7 @@ def parse_news(
             return FactForgotten(component, _word(predicate), objects)
         case "flow", {"stream": str(stream), "flowing": bool(flowing)}:
             if stream not in outputs:
-                raise _violation("RESULT_INVALID", f"{stream!r:.80} is no stream of its own")
+                raise _violation("RESULT_INVALID", f"{stream!r:.80} is no stream of this component")
             return StreamFlowing(component, stream, flowing)
         case "log", {"level": str(level), "message": str(message)}:
             return WorkerLogged(component, _word(level), printable_text(message[:MAX_TEXT]))

@@ -116,7 +116,7 @@ def spinning(component: str, busy_s: float) -> Problem:
     """It keeps a processor busy for nothing."""
     return Problem(
         "WORKER_CPU",
-        f"the worker has kept a processor busy for {busy_s:g} s, and nobody asks it for anything",
+        f"the worker has kept a processor busy for {busy_s:g} s without being asked for anything",
         where=component,
         fix="`nondum payload forget` it or pull it if that hurts; bound it by `cpu_percent` in "
         "[workers]",
@@ -168,7 +168,7 @@ def crash_loop(component: str, restarts: int, window_s: float, last: Problem) ->
 
 
 def not_running(component: str) -> Problem:
-    """There is nobody to ask."""
+    """There is no worker to ask."""
     fix = f"`nondum components` says how {component} is; plug its payload in again"
     return Problem("NOT_RUNNING", "no worker of this component runs now", where=component, fix=fix)
 

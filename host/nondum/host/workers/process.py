@@ -15,29 +15,29 @@ from nondum.host.sandbox.cgroups import Cgroup
 from nondum.host.workers.init_link import InitLink, OpenFiles, node_of
 
 DETACH_S = 2.0
-"""How long a process that was killed is waited for; one in the kernel's hands may never end."""
+"""How long a killed process is waited for; one in uninterruptible sleep may never end."""
 
 
 class WorkerProcess:
-    """A started process that leads a session of its own. Make it on the loop; it reaps itself."""
+    """A started process that leads a session. Make it on the loop; it reaps the process."""
 
     def __init__(
         self,
         popen: subprocess.Popen[bytes],
         cgroup: Cgroup | None = None,
-        keeper: InitLink | None = None,
+        init: InitLink | None = None,
         user: int | None = None,
     ) -> None:
-        """`keeper`, which it takes over, is that of a worker in a room of its own.
+        """`init`, which it takes over, is the link to the init of a worker's sandbox.
 
-        Raises `OSError` when its end cannot be watched; the keeper is still the caller's then.
+        Raises `OSError` when its end cannot be watched; the link is still the caller's then.
         """
         self.user = user
         """The user of the machine that it is, if not the host's."""
         self._popen = popen
-        self._keeper = keeper
+        self._init = init
         self.cgroup = cgroup
-        """What holds it and all that it starts; whoever ends the process ends the cgroup."""
+        """Holds the process and all that it starts; `end` ends the cgroup, too."""
         self.exited: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         """Its exit status, negative for the signal that ended it."""
         self._pidfd = os.pidfd_open(popen.pid)
@@ -49,8 +49,8 @@ class WorkerProcess:
 
     @property
     def pid(self) -> int:
-        """The worker's own id, as soon as it is known; until then that of what makes its room."""
-        inner = self._keeper.worker if self._keeper is not None else None
+        """The worker's id, as soon as it is known; until then that of what makes its sandbox."""
+        inner = self._init.worker if self._init is not None else None
         return inner if inner is not None else self._popen.pid
 
     @property
@@ -62,34 +62,34 @@ class WorkerProcess:
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the whole group, if any of it is left."""
         if self._popen.returncode is None:  # from then on the id may be somebody else's
-            inner = self._keeper.worker if self._keeper is not None else None
-            if inner is not None:  # its room and keeper only end, by themselves or like this
+            inner = self._init.worker if self._init is not None else None
+            if inner is not None:  # its sandbox and init only end, by themselves or by SIGKILL
                 _signal_group(inner, number)
             if inner is None or number is signal.SIGKILL:
                 _signal_group(self._popen.pid, number)
 
     def node(self, need: str, node: str) -> str:
         """The path at which it finds a device that it was granted."""
-        return node if self._keeper is None else node_of(need)
+        return node if self._init is None else node_of(need)
 
     async def grant(self, need: str, node: str, own: str) -> None:
-        """Let it have a device, under its own name too, where it has a room.
+        """Let it have a device, under the device's own name too, where it has a sandbox.
 
         Raises `WorkerFailed` (DEVICE_REFUSED).
         """
-        if self._keeper is not None:
-            await self._keeper.grant(need, node, own)
+        if self._init is not None:
+            await self._init.grant(need, node, own)
 
     async def revoke(self, need: str) -> None:
         """Take a device away."""
-        if self._keeper is not None:
-            await self._keeper.revoke(need)
+        if self._init is not None:
+            await self._init.revoke(need)
 
     async def open_files(self) -> OpenFiles | None:
         """What its processes have open, where the host cannot look at that by itself."""
-        if self._keeper is None or self.user is None or os.geteuid() == 0:
+        if self._init is None or self.user is None or os.geteuid() == 0:
             return None
-        return await self._keeper.open_files()
+        return await self._init.open_files()
 
     async def wait(self, timeout_s: float) -> bool:
         """Wait for the exit at most so long; answer whether it came."""
@@ -111,22 +111,22 @@ class WorkerProcess:
         # Its children in the group go with it. It is not reaped yet, so the id is still its own.
         self.signal(signal.SIGKILL)
         status = self._popen.wait()
-        if self._keeper is None:
+        if self._init is None:
             self.exited.set_result(status)
             return
         status = 128 - status if status > 128 else status  # as shells and bwrap(1) tell it
-        room_ended = self._keeper.take_pidfd()
-        self._keeper.close()
-        if room_ended is None:
+        init_pidfd = self._init.take_pidfd()
+        self._init.close()
+        if init_pidfd is None:
             self.exited.set_result(status)
             return
         loop = asyncio.get_running_loop()
-        try:  # what made the room may be gone before what is in it
-            loop.add_reader(room_ended, self._on_room_ended, room_ended, status)
+        try:  # what made the sandbox may end before what is in it
+            loop.add_reader(init_pidfd, self._on_init_ended, init_pidfd, status)
         except OSError:  # as where it never said who it is
-            self._on_room_ended(room_ended, status)
+            self._on_init_ended(init_pidfd, status)
 
-    def _on_room_ended(self, pidfd: int, status: int) -> None:
+    def _on_init_ended(self, pidfd: int, status: int) -> None:
         asyncio.get_running_loop().remove_reader(pidfd)
         os.close(pidfd)
         self.exited.set_result(status)

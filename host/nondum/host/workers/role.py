@@ -1,7 +1,7 @@
-"""How a worker counts: for its component, beside the one that does, or on its way out.
+"""The role of a worker: active, tried beside the active one, or leaving.
 
 Two releases of a payload may run side by side; which one stands for a component is what the
-catalogue says. Only that one is heard, asked and wired.
+catalogue says. Only the events of that one are passed on; only that one is asked and wired.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from nondum.host.core.events import Event, TrialFailed, WorkerLogged
 
 
 class Role(Enum):
-    """How a worker counts."""
+    """The role of a worker."""
 
     BESIDE = "beside"
     """Another one stands for its component; this one is tried."""
-    IN_FORCE = "in force"
+    ACTIVE = "active"
     """It stands for its component."""
     LEAVING = "leaving"
     """Another one has taken its place; it is being stopped."""
 
 
-HEARD: Mapping[Role, tuple[type[Event], ...]] = {
+EMITTED: Mapping[Role, tuple[type[Event], ...]] = {
     Role.BESIDE: (TrialFailed, WorkerLogged),
-    Role.IN_FORCE: (Event,),
+    Role.ACTIVE: (Event,),
     Role.LEAVING: (WorkerLogged,),
 }
-"""What others hear of it. What it claims meanwhile is kept with the worker."""
+"""The events of a worker that are passed on. What it claims meanwhile is kept with it."""

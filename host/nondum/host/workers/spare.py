@@ -29,9 +29,9 @@ from nondum.host.workers.init_link import CREDENTIALS, InitLink
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits
 
-ROOM = "NONDUM_ROOM"
-"""Environment variable that keeps room for the mark of the worker (see `launcher.py`)."""
-ROOM_BYTES = 2048
+PLACEHOLDER = "NONDUM_PLACEHOLDER"
+"""Environment variable whose memory the mark of the worker overwrites (see `launcher.py`)."""
+PLACEHOLDER_BYTES = 2048
 OWNER = "NONDUM_SPARE_OF"
 """Environment variable of interpreters that have not become a worker: whose they are."""
 SAID_BYTES = 64 * 1024
@@ -52,10 +52,10 @@ class Spare:
         self.cgroup: Cgroup | None = None
         self.said = ""
         """The last line that it said before it ended without having become a worker."""
-        self._has_keeper = confinement.has_keeper
+        self._has_init = confinement.has_init
         self._namespace: NewNamespace | None = None
         self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        if self._has_keeper:  # whose a message is comes with it
+        if self._has_init:  # whose a message is comes with it
             self._orders.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
         try:
             with theirs:
@@ -77,7 +77,7 @@ class Spare:
         owner: str,
         startup_s: float,
     ) -> Spare:
-        """Start one in a cgroup of its own, if there are cgroups, see `settle`. Raises `OSError`.
+        """Start one in a separate cgroup, if there are cgroups, see `settle`. Raises `OSError`.
 
         The kernel takes some 20 ms to put a process into a control group: a thread waits for it.
         """
@@ -93,8 +93,8 @@ class Spare:
         return spare
 
     def settle(self, startup_s: float, cgroups: Cgroups | None = None) -> None:
-        """Give it a cgroup, and the users that its room has, if it is to have any: then it has been
-        started. Blocks.
+        """Give it a cgroup, and map the users of its sandbox, if it is to have any: then it has
+        been started. Blocks.
 
         Call it once. Raises `OSError`; `TimeoutError` if it has not been after `startup_s`.
         """
@@ -133,7 +133,7 @@ class Spare:
         return True
 
     def map_scratch(self, user: int, startup_s: float) -> None:
-        """Have its scratch folder, which it sends a mount of, be a user's in its room. Blocks.
+        """Map its scratch folder, which it sends a mount of, to a user in its sandbox. Blocks.
 
         Call it after `become`. Raises `OSError`, `TimeoutError` if it does not send it within
         `startup_s`: a slow host is still loading the interpreter. Then it is still to be closed.
@@ -174,18 +174,18 @@ class Spare:
 
         Call it once, on the loop. Raises `OSError`; then it is still to be closed.
         """
-        if self._has_keeper:
-            keeper = InitLink(self._orders)
+        if self._has_init:
+            init = InitLink(self._orders)
             try:
-                return WorkerProcess(self.popen, self.cgroup, keeper, user)
+                return WorkerProcess(self.popen, self.cgroup, init, user)
             except OSError:
-                keeper.close()
+                init.close()
                 raise
         self._orders.close()
         return WorkerProcess(self.popen, self.cgroup, user=user)
 
     async def end(self) -> None:
-        """`close` it without holding up the loop, whoever is cancelled meanwhile."""
+        """`close` it without holding up the loop, also if the caller is cancelled meanwhile."""
         await until_done(asyncio.create_task(asyncio.to_thread(self.close)))
 
     def close(self) -> None:
@@ -203,7 +203,7 @@ class Spare:
             self.cgroup.end()
 
     def _kill(self) -> None:
-        """SIGKILL all of it: its room may not be finished."""
+        """SIGKILL all of it: its sandbox may not be finished."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.popen.pid, signal.SIGKILL)
 
@@ -246,6 +246,6 @@ def _started(
             "LANG": "C.UTF-8",
             "MALLOC_ARENA_MAX": "2",  # read before Python's first line
             OWNER: owner,
-            ROOM: "-" * ROOM_BYTES,
+            PLACEHOLDER: "-" * PLACEHOLDER_BYTES,
         },
     )

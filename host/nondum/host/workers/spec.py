@@ -25,7 +25,7 @@ class Limits:
     file_mb: int = 1024
     """Size of one file that it writes."""
     core_mb: int = 0
-    """Size of a core file: memory may hold what is nobody else's business."""
+    """Size of a core file: memory may hold secrets."""
     cpu_s: int | None = None
     """Processor seconds in all; None: no limit, since workers live long."""
     numeric_threads: int = 1

@@ -1,9 +1,8 @@
 """Which stream is wired to which input, and why: the host introduces, workers do the rest.
 
 An action's stream parameters are wired for as long as the action runs; the plan chose them.
-Optional inputs are in no plan: `optional_inputs` says what each gets; they are wired anew whenever
-that changes. A stream of another host is wired by whoever reaches it (`Remote`), and only where a
-plan asks for it.
+Optional inputs are in no plan: `optional_inputs` says what each gets; they are wired again
+whenever that changes. `Remote` wires a stream of another host, and only where a plan asks for it.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ class Remote(Protocol):
         """Have a reader wired until `disconnect`; wait for the first time. Raises `NondumError`.
 
         `consume` gives a consumer's half of a connection to the reader, again after the stream had
-        to be opened anew.
+        to be opened again.
         """
 
     async def tap(self, stream: str, name: str, connection: Connection) -> None:

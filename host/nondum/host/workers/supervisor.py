@@ -13,7 +13,7 @@ from nondum.host.core.shielded import until_done
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher
-from nondum.host.workers.role import HEARD, Role
+from nondum.host.workers.role import EMITTED, Role
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.supervision import Supervision
 from nondum.host.workers.worker import Worker, start_worker
@@ -53,11 +53,9 @@ class Household(Protocol):
 class Supervisor:
     """One component's worker and the ones that come after it."""
 
-    def __init__(
-        self, spec: WorkerSpec, household: Household, standing: Role = Role.IN_FORCE
-    ) -> None:
+    def __init__(self, spec: WorkerSpec, household: Household, role: Role = Role.ACTIVE) -> None:
         self.spec = spec
-        self.standing = standing
+        self.role = role
         """How much it counts; what happens to it is told accordingly."""
         self._worker: Worker | None = None
         self._household = household
@@ -95,15 +93,15 @@ class Supervisor:
 
     def come_into_force(self) -> None:
         """From now on it stands for its component."""
-        self.standing = Role.IN_FORCE
+        self.role = Role.ACTIVE
         if self._worker is not None:
             self._household.on_ready(self._worker)
             self._worker.tell_conditions()
 
     def withdraw(self) -> None:
-        """Nobody shall count on it any more; `stop` it."""
+        """Take it out of use; `stop` it next."""
         self._on_gone()
-        self.standing = Role.LEAVING
+        self.role = Role.LEAVING
 
     async def stop(self, grace_s: float) -> None:
         """End the worker, if there is one, and start no more. Stopping twice is allowed.
@@ -131,7 +129,7 @@ class Supervisor:
             problem = await self._work()
             if self.is_stopping:
                 return
-            if self.standing is Role.BESIDE:
+            if self.role is Role.BESIDE:
                 self._emit(events.TrialFailed(self.spec.payload, self.spec.component, (problem,)))
                 return
             component, payload = self.spec.component, self.spec.payload
@@ -184,27 +182,27 @@ class Supervisor:
 
     async def _start_worker(self) -> None:
         household = self._household
-        is_in_force = self.standing is Role.IN_FORCE
+        is_active = self.role is Role.ACTIVE
         welcome = household.welcome(self.spec)
         self._worker = await start_worker(
             self.spec,
-            welcome if is_in_force else {**welcome, "devices": {}},
+            welcome if is_active else {**welcome, "devices": {}},
             launcher=household.launcher,
             timing=household.timing,
             emit=self._emit,
             on_crowded=household.search.begin,
             on_launched=household.search.watch,
         )
-        if self.standing is Role.IN_FORCE:
+        if self.role is Role.ACTIVE:
             household.on_ready(self._worker)
         self._emit(events.WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
         self._worker.tell_conditions()
 
     def _emit(self, event: Event) -> None:
         """Tell what has happened, as far as it is anybody's business."""
-        if isinstance(event, HEARD[self.standing]):
+        if isinstance(event, EMITTED[self.role]):
             self._household.emit(event)
 
     def _on_gone(self) -> None:
-        if self._worker is not None and self.standing is Role.IN_FORCE:
+        if self._worker is not None and self.role is Role.ACTIVE:
             self._household.on_gone(self._worker)

@@ -1,4 +1,4 @@
-"""Rounds: every two seconds somebody looks at what each worker uses, sooner if the disk fills."""
+"""Usage checks: every two seconds, what each worker uses is looked at, sooner if the disk fills."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from nondum.host.core.events import Emit, WorkerStrained
 from nondum.host.workers.worker import Worker
 
 GLANCE_S = 0.5
-"""Between two looks at the disk's free room: one system call."""
+"""Between two looks at the disk's free space: one system call."""
 FLOOD_BYTES = 64 * 1024 * 1024
-"""Room that goes between two rounds before the next one begins at once."""
+"""Disk space that is used up between two checks before the next one begins at once."""
 
 
 class UsageChecks:

@@ -210,8 +210,8 @@ class Worker:
         finally:
             del self._calls[pending.id]
 
-    async def heard(self, beats: int) -> None:
-        """Wait for so many more signs of life; those who hang or end are ended, see `gone`."""
+    async def wait_for_beats(self, beats: int) -> None:
+        """Wait for `beats` further heartbeats; return sooner when the worker is `gone`."""
         wanted = self._beats + beats
         while self._beats < wanted and not self.gone.done():
             self._beaten.clear()
@@ -270,7 +270,7 @@ class Worker:
         """End what the process has started. Blocks. Raises `OSError`."""
         steps = _ends_of_all(self._process, self.spec)
         steps += [partial(self._withdraw, name) for name in tuple(self._reached)]
-        if problem.code == problems.SCRATCH_FULL:  # the next worker is to have room, and the host
+        if problem.code == problems.SCRATCH_FULL:  # the next worker needs space, and the host does
             steps.append(partial(scratch.empty, self.spec.scratch))
         clear_away(*steps)
 

@@ -75,7 +75,7 @@ class Workers:
         self._host, self._emit = host, emit
         self._manager = plugin_manager()
         self._supervisors: dict[str, Supervisor] = {}
-        self._others = ExtraWorkers()
+        self._extra_workers = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
         self._mounts: Mapping[str, Any] = {}
         core_value_types()  # read now: a worker may be started when there is little memory
@@ -90,7 +90,7 @@ class Workers:
         """The hooks of all running plugins; acting ones give awaitables. Pass `ctx=None`."""
         return self._manager.hook
 
-    async def start(self, spec: WorkerSpec, standing: Role = Role.IN_FORCE) -> PluginDescription:
+    async def start(self, spec: WorkerSpec, role: Role = Role.ACTIVE) -> PluginDescription:
         """Start a component's worker and keep one alive until `stop`.
 
         Beside one of another payload, or if told so, it stands for nothing until `take_over`.
@@ -102,11 +102,11 @@ class Workers:
             if not present.is_stopping:
                 raise ValueError(f"component {spec.component!r} has a worker already")
             await present.ended()
-        in_force = self._supervisors.get(spec.component)
-        is_second = in_force is not None and in_force.spec.payload != spec.payload
-        if is_second or standing is Role.BESIDE:
+        active = self._supervisors.get(spec.component)
+        is_second = active is not None and active.spec.payload != spec.payload
+        if is_second or role is Role.BESIDE:
             supervisor = Supervisor(spec, self, Role.BESIDE)
-            self._others.add(supervisor)
+            self._extra_workers.add(supervisor)
         else:
             supervisor = self._supervisors[spec.component] = Supervisor(spec, self)
         if self._going_round is None:
@@ -122,29 +122,29 @@ class Workers:
         supervisor = self._found(component, payload)
         worker = supervisor.worker if supervisor is not None else None
         if worker is not None:
-            await worker.heard(self.timing.settle_beats)
+            await worker.wait_for_beats(self.timing.settle_beats)
         if worker is None or worker.gone.done():
             ended = worker.gone.result() if worker else problems.not_running(component)
             raise errors.WorkerFailed(ended)
 
     def take_over(self, owners: Mapping[str, str]) -> None:
         """Have the workers of those payloads stand for their components that the catalogue says:
-        component → payload. Who stood for one before is not heard any more, and to be stopped."""
+        component → payload. The worker that stood for one before is ignored, and to be stopped."""
         for component, payload in owners.items():
-            new = self._others.beside(component, payload)
+            new = self._extra_workers.beside(component, payload)
             if new is None:
                 continue
             old = self._supervisors.get(component)
             if old is not None:
                 old.withdraw()
-                self._others.add(old, self._devices.pop(component, {}))
-            self._others.drop(new)
+                self._extra_workers.add(old, self._devices.pop(component, {}))
+            self._extra_workers.drop(new)
             self._supervisors[component] = new
             new.come_into_force()
 
     async def ended(self, payload: str) -> None:
         """Wait until no worker of a payload is left; somebody else stops them."""
-        every = (*self._supervisors.values(), *self._others)
+        every = (*self._supervisors.values(), *self._extra_workers)
         await asyncio.gather(*(s.ended() for s in every if s.spec.payload == payload))
 
     async def restart(self, component: str) -> None:
@@ -170,12 +170,12 @@ class Workers:
         supervisor = self._found(component, payload)
         if supervisor is None:
             return
-        if supervisor.standing is Role.IN_FORCE:
-            self._others.add(supervisor, self._devices.pop(component, {}))
+        if supervisor.role is Role.ACTIVE:
+            self._extra_workers.add(supervisor, self._devices.pop(component, {}))
         try:
             await supervisor.stop(grace_s)
         finally:
-            self._others.drop(supervisor)
+            self._extra_workers.drop(supervisor)
             if self._supervisors.get(component) is supervisor:
                 del self._supervisors[component]
 
@@ -183,7 +183,7 @@ class Workers:
         """End all workers."""
         if self._going_round is not None:
             self._going_round.cancel()
-        every = (*self._supervisors.values(), *self._others)
+        every = (*self._supervisors.values(), *self._extra_workers)
         stopping = (self.stop(s.spec.component, grace_s, s.spec.payload) for s in every)
         await asyncio.gather(*stopping)
         await asyncio.gather(*self._calls, return_exceptions=True)
@@ -256,7 +256,7 @@ class Workers:
         """
         nodes = [{"node": n, "properties": dict(p)} for n, p in ((node, properties), *others)]
         for each in nodes:
-            await self._others.released(str(each["node"]))
+            await self._extra_workers.released(str(each["node"]))
         device = {**nodes[0], "nodes": nodes}
         self._devices.setdefault(component, {})[need] = device
         await self._tell_of_device(component, lambda worker: worker.attach(need, device))
@@ -315,7 +315,7 @@ class Workers:
 
     def pids_of(self, payload: str) -> tuple[int, ...]:
         """The processes of a payload's workers, as far as they are known."""
-        every = (*self._supervisors.values(), *self._others)
+        every = (*self._supervisors.values(), *self._extra_workers)
         mine = (s.worker for s in every if s.spec.payload == payload)
         return tuple(pid for worker in mine if worker is not None for pid in worker.pids())
 
@@ -372,10 +372,10 @@ class Workers:
         supervisor = self._supervisors.get(component)
         if supervisor is not None and payload in ("", supervisor.spec.payload):
             return supervisor
-        return self._others.get(component, payload)
+        return self._extra_workers.get(component, payload)
 
     def _running(self) -> list[Worker]:
-        """The workers in force."""
+        """The active workers."""
         found = (supervisor.worker for _, supervisor in sorted(self._supervisors.items()))
         return [worker for worker in found if worker is not None]
 
@@ -400,7 +400,7 @@ class Workers:
     async def _carry_out(self, worker: Worker, call: Call, values: Sequence[FactValue]) -> None:
         sent = [[p, list(objects), value] for p, objects, value in values if value is not None]
         try:
-            await self._others.left(call.component)  # two releases do not act at the same time
+            await self._extra_workers.left(call.component)  # two releases do not act together
             async with self.streams.wired(call.component, call.behaviour, call.arguments):
                 if call.is_halting:
                     call.end(RunState.HALTED, "halted before it began")

@@ -58,7 +58,7 @@ class Setbacks:
     _found: dict[str, Setback] = field(default_factory=dict)
 
     def note(self, name: str, failures: int, reason: str) -> Setback:
-        """Take down that an action was given up after so many failures more."""
+        """Record that an action was given up after a number of further failures."""
         known = self._found.get(name, Setback(0, 0, ""))
         found = Setback(known.failures + failures, known.rounds + 1, reason)
         self._found[name] = found

@@ -34,11 +34,11 @@ class Alternatives:
         schema) that could give what is needed of the step; cheapest first."""
         playing = {_player(step.action) for step in regression.steps}
         return tuple(
-            tuple(self._others(regression, index, playing))
+            tuple(self._alternatives(regression, index, playing))
             for index in range(len(regression.steps))
         )
 
-    def _others(
+    def _alternatives(
         self, regression: Regression, index: int, playing: set[Player]
     ) -> Sequence[GroundAction]:
         found: dict[Player, GroundAction] = {}

@@ -31,7 +31,7 @@ class Reservation:
     units: frozenset[str]
     """The units that act in it and serve one behaviour at a time."""
     needs: frozenset[str]
-    """Facts, twins included, that nobody else may make false."""
+    """Facts, twins included, that no other plan may make false."""
     ends: frozenset[str]
     """Facts, twins included, that it makes false itself."""
 

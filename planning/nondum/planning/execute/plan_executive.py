@@ -1,6 +1,8 @@
-"""The decisions of a task tree: what goes on, what is halted, what is started, and why.
+"""The plan executive: decides what goes on, what is halted, what is started, and why.
 
-Pure but for the `Runner`: the same world at the same time gives the same decision.
+It starts and halts nothing itself: it makes a `Run` of each action that is to run, and marks the
+runs that are to end; the leaves of the task tree act. The same world at the same time gives the
+same decision.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from nondum.planning.execute.change_filter import ChangeFilter
 from nondum.planning.execute.guards import Footing, facts_after, footing, twins_in
 from nondum.planning.execute.partial_order import GOAL
 from nondum.planning.execute.regression import Regression, Rest, Stuck
-from nondum.planning.execute.running import Run, Runner, RunState, World
+from nondum.planning.execute.running import Run, RunState, World
 from nondum.planning.execute.step import Step
 from nondum.planning.merge.goal import GoalKind
 
@@ -54,7 +56,6 @@ class PlanExecutive:
         self,
         regression: Regression,
         *,
-        runner: Runner,
         kind: GoalKind,
         exclusive: frozenset[str] = frozenset(),
         runs: Iterable[Run] = (),
@@ -79,7 +80,6 @@ class PlanExecutive:
         """Action → the mask of its steps."""
         for index, step in enumerate(regression.steps):
             self._places[step.name] = self._places.get(step.name, 0) | 1 << index
-        self._runner = runner
         self.decisions = 0
         """How often the world asked for a new decision."""
         self._run_states: list[tuple[str, RunState, bool]] = []
@@ -265,8 +265,8 @@ class PlanExecutive:
             return Phase.HOLDING
         return self._advance(rest, ground, now_s)
 
-    def steady(self, now_s: float) -> tuple[str, ...]:
-        """The lasting actions that have held for a while."""
+    def proven(self, now_s: float) -> tuple[str, ...]:
+        """The lasting actions that have held long enough to count as working."""
         lasting = (name for name, run in self.runs.items() if run.step.lasting)
         return tuple(name for name in lasting if not self._is_unproven(name, now_s))
 
@@ -319,7 +319,7 @@ class PlanExecutive:
             elif obstacle := self._obstacle(step, ground):
                 self._waiting[index] = obstacle
             else:
-                self.runs[step.name] = Run(step, self._runner.start(step), now_s)
+                self.runs[step.name] = Run(step, now_s)
         if self.exhausted:
             reasons = (f"{n} {self.attempts.given_up(n)}" for n in self.exhausted)
             return self._give_up("; ".join(reasons))

@@ -114,7 +114,7 @@ class Evidence:
 
     @property
     def since_s(self) -> float | None:
-        """Since when somebody has said so; None: nobody does."""
+        """Since when a component or the host has said so; None: none does."""
         return min((source.at_s for source in self.pros), default=None)
 
 
@@ -142,7 +142,7 @@ class Provenance:
         return self._contested
 
     def uncontested(self) -> set[str]:
-        """The facts that somebody speaks for, and nobody against."""
+        """The facts with a word for them and none against them."""
         return self._words.keys() - self._contested
 
     def of(self, fact: str) -> Mapping[Voice, Source]:

@@ -77,12 +77,26 @@ class World(Protocol):
 
 
 @dataclass(slots=True)
+class NotStarted:
+    """An action that its leaf has not started yet. Satisfies `RunningAction`."""
+
+    state: RunState = RunState.STARTING
+    reason: str = ""
+    progress: str = ""
+
+    def halt(self) -> None:
+        """It never starts."""
+        self.state = RunState.HALTED
+
+
+@dataclass(slots=True)
 class Run:
-    """A started action in the hands of a task tree."""
+    """An action that a task tree runs."""
 
     step: Step
-    action: RunningAction
     started_s: float
+    action: RunningAction = field(default_factory=NotStarted)
+    """The leaf of the step starts it, and halts it."""
     established_s: float | None = None
     """When it was first seen established."""
     halted_because: str = ""
@@ -95,6 +109,11 @@ class Run:
 
     def __post_init__(self) -> None:
         self.progressed_s = self.started_s
+
+    @property
+    def is_started(self) -> bool:
+        """Whether a leaf has started it."""
+        return not isinstance(self.action, NotStarted)
 
     @property
     def is_halting(self) -> bool:
@@ -117,7 +136,6 @@ class Run:
             self._progress, self.progressed_s = self.action.progress, now_s
 
     def halt(self, because: str) -> None:
-        """Ask it to end, once."""
+        """Count on it no more: its leaf is to halt it. The first reason stays."""
         if not self.is_halting:
             self.halted_because = because
-            self.action.halt()

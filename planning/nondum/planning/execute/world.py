@@ -103,10 +103,10 @@ class WorldModel:
         return tuple(sorted(f for f in self._parked if self._is_upheld(f, ())))
 
     def conflicts(self) -> tuple[Problem, ...]:
-        """Where components observe different values of a functional predicate (E-FACT-CONFLICT)."""
+        """Different observed values of one functional predicate: PDDL_FACT_CONFLICT."""
         observed: dict[str, dict[str, str]] = {}
         for fact in self._functional_facts():
-            for source in self._standing(fact, ()) if fact not in self._parked else ():
+            for source in self._prevailing(fact, ()) if fact not in self._parked else ():
                 if source.kind is SourceKind.OBSERVATION:
                     observed.setdefault(group_of(fact), {})[source.who] = fact
         return tuple(
@@ -303,10 +303,10 @@ class WorldModel:
         return frozenset(facts)
 
     def _is_upheld(self, fact: str, overlays: Iterable[Overlay]) -> bool:
-        return any(True for _ in self._standing(fact, overlays))
+        return any(True for _ in self._prevailing(fact, overlays))
 
-    def _standing(self, fact: str, overlays: Iterable[Overlay]) -> Iterator[Source]:
-        """The words for a fact that stand against all those against it."""
+    def _prevailing(self, fact: str, overlays: Iterable[Overlay]) -> Iterator[Source]:
+        """The words for a fact that prevail over all those against it."""
         words = self._words(fact, overlays)
         cons = [word for word in words if word.is_against]
         for word in words:
@@ -323,7 +323,7 @@ class WorldModel:
 
     def _weight(self, fact: str, overlays: Iterable[Overlay]) -> Weight:
         is_observed = parts(fact)[0] in self._observed
-        words = self._standing(fact, overlays)
+        words = self._prevailing(fact, overlays)
         return max(weight(word, is_observed=is_observed) for word in words)
 
     def _functional_facts(self) -> Iterator[str]:
@@ -345,5 +345,5 @@ class WorldModel:
 
 
 def _positive(facts: Iterable[str]) -> frozenset[str]:
-    """Facts without twins: a twin holds when its fact does not, nobody has to say so."""
+    """Facts without twins: a twin holds whenever its fact does not, and needs no word for it."""
     return frozenset(fact for fact in facts if not is_twin(fact))

@@ -17,7 +17,7 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.planner import AlreadyTrue, Answer, GaveUp, GroundTask, Plan, Unsolvable
 
 Search: TypeAlias = Callable[[GroundTask], Answer]
-"""Plans a small task, within bounds of its own."""
+"""Plans a small task, within its own bounds."""
 
 _PARTS_LIMIT = 8
 """Of a goal with more parts, these are looked at."""

@@ -9,11 +9,11 @@ from nondum.planning.explain.cause import Cause, Lack
 from nondum.planning.explain.conflict import Conflict, Search, conflict_of
 from nondum.planning.explain.missing import Outlook
 from nondum.planning.explain.tracing import Tracer
-from nondum.planning.ground.draft import Draft, drafted
 from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.literal_task import LiteralTask, expanded
 from nondum.planning.ground.matching import Relations
 from nondum.planning.ground.reachable_facts import reached_in
-from nondum.planning.ground.schema_relevance import concern
+from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.claims import claims_of
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.core import core_graph
@@ -56,23 +56,23 @@ def explain(
     `FragmentRefused` as `ground` does.
     """
     believed = frozenset(facts)
-    part = concern(merged, goal)
+    part = relevant_part(merged, goal)
     known = [text for text in believed if predicate_of(text) in part.wishes.read]
     found = explore(part.merged, known, objects)
-    draft = drafted(part.merged, found, goal)
+    literal_task = expanded(part.merged, found, goal)
     reachable = Relations()
-    for number in sorted(reached_in(draft)):
+    for number in sorted(reached_in(literal_task)):
         reachable.add(*found.table.facts[number])
-    lasting = frozenset(map(found.table.text, draft.believed - _deleted(draft)))
+    lasting = frozenset(map(found.table.text, literal_task.believed - _deleted(literal_task)))
     causes = Tracer(part.merged, Outlook(reachable, lasting, found.members)).causes(goal)
     if causes:
         return Diagnosis(causes)
     return Diagnosis((), conflict_of(merged, believed, goal, objects, search))
 
 
-def _deleted(draft: Draft) -> frozenset[int]:
-    deleted = {fact for action in draft.actions for fact in action.delete}
-    for action in draft.actions:
+def _deleted(literal_task: LiteralTask) -> frozenset[int]:
+    deleted = {fact for action in literal_task.actions for fact in action.delete}
+    for action in literal_task.actions:
         deleted.update(*(change.delete for change in action.changes))
     return frozenset(deleted)
 

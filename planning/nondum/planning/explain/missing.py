@@ -26,9 +26,9 @@ from nondum.planning.pddl.typegraph import types_or_root
 _PARTIAL_BINDINGS_LIMIT = 2000
 """How many are tried for one condition; beyond it the best ones so far are told."""
 _TIES_LIMIT = 6
-"""So many equally small sets of missing parts are told."""
+"""Equally small sets of missing parts that are told, at most."""
 _INSTANCES_LIMIT = 200
-"""So many objects of a `forall` are looked at."""
+"""Objects of a `forall` that are looked at, at most."""
 
 Missing = tuple[Formula, ...]
 """Literals, their variables replaced where they are bound; an `exists` of which there is none."""

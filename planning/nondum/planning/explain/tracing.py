@@ -32,7 +32,7 @@ from nondum.planning.pddl.syntax import (
 from nondum.planning.pddl.typegraph import types_or_root
 
 _NEEDS_LIMIT = 2000
-"""So many conditions are looked at; chains beyond them are not found."""
+"""Conditions that are looked at, at most; chains beyond them are not found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class _Giver:
     """An action, one of its conditional changes, or a rule, and one atom that it makes true."""
 
     step: str
-    """The action's name; empty for a rule, which nobody carries out."""
+    """The action's name; empty for a rule, which is not carried out."""
     variables: tuple[TypedName, ...]
     conditions: tuple[Condition, ...]
     atom: Atom

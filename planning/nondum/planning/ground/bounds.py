@@ -30,5 +30,5 @@ class TooManyBindings(FragmentRefused):
 
 
 def work_for(limit: int) -> Work:
-    """What may be looked at where so many bindings may be made."""
+    """The bindings that may be looked at where up to `limit` may be made."""
     return Work(_WORK_PER_INSTANCE * limit)

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from nondum.planning.ground.bounds import TooManyBindings
-from nondum.planning.ground.draft import drafted
 from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.literal_task import expanded
 from nondum.planning.ground.negation import positive_task
 from nondum.planning.ground.progression import start
 from nondum.planning.merge.derivation import asked_by
@@ -16,7 +16,7 @@ from nondum.planning.pddl.facts import predicate_of
 from nondum.planning.pddl.normal import Condition
 
 LIMIT = 5_000
-"""So many bindings of rules are made: people who ask what is believed do not wait for more."""
+"""Bindings of rules, at most: people who ask what is believed do not wait for more."""
 
 
 def conclusions(merged: Merged, facts: Iterable[str]) -> Mapping[str, tuple[DerivedRule, ...]]:
@@ -50,7 +50,7 @@ def _drawn(
 ) -> Mapping[str, tuple[DerivedRule, ...]]:
     only_rules = replace(merged, domain=replace(merged.domain, actions={}, derived=derived))
     found = explore(only_rules, facts, limit=LIMIT)
-    task = positive_task(drafted(only_rules, found, Condition(), limit=LIMIT), found.table)
+    task = positive_task(expanded(only_rules, found, Condition(), limit=LIMIT), found.table)
     rules: dict[str, tuple[DerivedRule, ...]] = {}
     for rule in derived:
         name = rule.head.predicate

@@ -1,4 +1,4 @@
-"""Functional predicates in a task: whoever gives one a value takes the others away (rule M17)."""
+"""Functional predicates in a task: a new value deletes all other ones (rule M17)."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class Expander:
     """What is true and cannot change need not be guarded."""
     work: Work
     """What writing out quantifiers may take."""
-    standing: list[Disjunction] = field(default_factory=list)
+    disjunctions: list[Disjunction] = field(default_factory=list)
     """The derived facts that had to be made so far."""
     _relations: Relations = field(default_factory=Relations)
     _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
@@ -194,17 +194,17 @@ class Expander:
                 bodies: list[Literals] = []
                 for part in parts:
                     bodies += _split(self._small(part, name)) or ()
-                fact = self.found.table.number(name, (str(len(self.standing)),))
-                self.standing.append(Disjunction(fact, tuple(dict.fromkeys(bodies))))
+                fact = self.found.table.number(name, (str(len(self.disjunctions)),))
+                self.disjunctions.append(Disjunction(fact, tuple(dict.fromkeys(bodies))))
                 return Literals(positive=frozenset((fact,)))
         return tree
 
-    def standing_for(self, alternatives: Sequence[Literals], name: str) -> Literals:
+    def disjunction(self, alternatives: Sequence[Literals], name: str) -> Literals:
         """One conjunction that holds where one of several does."""
         if len(alternatives) == 1:
             return alternatives[0]
-        fact = self.found.table.number(name, (str(len(self.standing)),))
-        self.standing.append(Disjunction(fact, tuple(alternatives)))
+        fact = self.found.table.number(name, (str(len(self.disjunctions)),))
+        self.disjunctions.append(Disjunction(fact, tuple(alternatives)))
         return Literals(positive=frozenset((fact,)))
 
 

@@ -121,7 +121,7 @@ class Fixpoint:
     def run(self) -> Exploration:
         heads = list(self._heads())
         joins = [(j, trigger, h) for h in heads if not h.is_bound for trigger, j in h.joins]
-        counter = _Tally(head for head in heads if head.is_bound)
+        counter = _FactCounter(head for head in heads if head.is_bound)
         relations = Relations()
         triggered: defaultdict[str, list[tuple[Join, Head]]] = defaultdict(list)
         for join, trigger, head in joins:
@@ -172,7 +172,7 @@ class Fixpoint:
             raise self._exhausted_by(head, before) from None
         self._spent[head] += before - self.work.left
 
-    def _fire(self, counter: _Tally) -> None:
+    def _fire(self, counter: _FactCounter) -> None:
         while counter.complete:
             head, before = counter.complete.popleft(), self.work.left
             try:
@@ -202,7 +202,7 @@ class Fixpoint:
         )
 
 
-class _Tally:
+class _FactCounter:
     """Rules without variables: each is complete when the last of its facts is there."""
 
     def __init__(self, heads: Iterable[Head]) -> None:

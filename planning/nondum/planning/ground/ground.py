@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT
 from nondum.planning.ground.displacement import displaced
-from nondum.planning.ground.draft import drafted
 from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.literal_task import expanded
 from nondum.planning.ground.negation import positive_task
 from nondum.planning.ground.relevance import helpful
-from nondum.planning.ground.schema_relevance import concern
+from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.domain import Merged, functional_predicates
 from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.facts import predicate_of
@@ -37,10 +37,10 @@ def ground(
     input gives the same task, whatever the order of `facts`. Raises `FragmentRefused` as `explore`
     does, for more than `limit` bound actions.
     """
-    part = concern(merged, goal)
+    part = relevant_part(merged, goal)
     read = part.read
     known = (text for text in facts if predicate_of(text) in read)
     found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
     found = displaced(found, functional_predicates(merged.domain))
-    draft = drafted(part.merged, found, goal, limit=limit)
-    return positive_task(helpful(draft), found.table)
+    literal_task = expanded(part.merged, found, goal, limit=limit)
+    return positive_task(helpful(literal_task), found.table)

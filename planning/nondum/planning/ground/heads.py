@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _WORK_OF_DECIDING = 10
 """What deciding a disjunction or quantifier counts as."""
 _WORK_OF_BINDING = 5
-"""The same of a binding that is made for nobody."""
+"""The same of a binding that no action or rule needs."""
 
 
 class _Template:

@@ -18,7 +18,7 @@ from nondum.planning.ground.matching import Pattern
 from nondum.planning.ground.relations import Key, Relations, Row
 
 _FEW = 32
-"""So many objects are looked up one by one rather than found among all rows."""
+"""Up to this number, objects are looked up one by one rather than found among all rows."""
 
 Values: TypeAlias = list[str]
 """A rule's variables, then the constants that it names; by position."""

@@ -1,4 +1,4 @@
-"""From a draft to a task of positive facts only: what must be false gets a twin.
+"""From a literal task to one of positive facts only: what must be false gets a twin.
 
 The twin of a basic fact is kept by the actions that change the fact; that of a derived fact is the
 complement of its layer.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import product
 
-from nondum.planning.ground.draft import Draft, DraftAction, DraftChange
+from nondum.planning.ground.literal_task import LiteralAction, LiteralChange, LiteralTask
 from nondum.planning.ground.relations import FactTable
 from nondum.planning.pddl.facts import twin
 from nondum.planning.pddl.literals import Literals
@@ -20,18 +20,18 @@ _WAYS_LIMIT = 256
 """In how many ways the effects of one action may cancel each other."""
 
 
-def positive_task(draft: Draft, table: FactTable) -> GroundTask:
+def positive_task(literal_task: LiteralTask, table: FactTable) -> GroundTask:
     """Write the task that planners read. Raises `FragmentRefused` (PDDL_TOO_MANY)."""
-    return _Writing(draft, table).task()
+    return _Writing(literal_task, table).task()
 
 
 class _Writing:
-    def __init__(self, draft: Draft, table: FactTable) -> None:
-        self._draft = draft
+    def __init__(self, literal_task: LiteralTask, table: FactTable) -> None:
+        self._literal_task = literal_task
         self._table = table
-        self._derived = {rule.head for rule in draft.rules}
-        self._negated = frozenset(_negated(draft))
-        mentioned = set(_mentioned(draft))
+        self._derived = {rule.head for rule in literal_task.rules}
+        self._negated = frozenset(_negated(literal_task))
+        mentioned = set(_mentioned(literal_task))
         names = {table.text(fact) for fact in mentioned}
         names |= {twin(table.text(fact)) for fact in self._negated}
         self._facts = tuple(sorted(names))
@@ -40,15 +40,15 @@ class _Writing:
         self._twin = {fact: at[twin(table.text(fact))] for fact in self._negated}
 
     def task(self) -> GroundTask:
-        believed = (self._draft.believed & self._at.keys()) - self._derived
+        believed = (self._literal_task.believed & self._at.keys()) - self._derived
         false = self._negated - self._derived - believed
         return GroundTask(
             facts=self._facts,
             init=self._indices(believed) | frozenset(self._twin[fact] for fact in false),
-            goal=self._condition(self._draft.goal),
-            actions=tuple(self._action(action) for action in self._draft.actions),
+            goal=self._condition(self._literal_task.goal),
+            actions=tuple(self._action(action) for action in self._literal_task.actions),
             derived=tuple(
-                layer for n in range(self._draft.layers) if (layer := self._layer(n)).rules
+                layer for n in range(self._literal_task.layers) if (layer := self._layer(n)).rules
             ),
         )
 
@@ -60,14 +60,14 @@ class _Writing:
         return self._indices(literals.positive) | negative
 
     def _layer(self, number: int) -> Layer:
-        rules = [rule for rule in self._draft.rules if rule.layer == number]
+        rules = [rule for rule in self._literal_task.rules if rule.layer == number]
         negated = sorted({rule.head for rule in rules} & self._negated)
         return Layer(
             tuple(Rule(self._at[rule.head], self._condition(rule.body)) for rule in rules),
             tuple((self._at[fact], self._twin[fact]) for fact in negated),
         )
 
-    def _action(self, action: DraftAction) -> GroundAction:
+    def _action(self, action: LiteralAction) -> GroundAction:
         gone = {fact for fact in action.delete & self._negated if not _adders(action, fact)}
         add = self._indices(action.add) | {self._twin[fact] for fact in gone}
         delete = self._indices(action.delete) | {self._twin[f] for f in action.add & self._negated}
@@ -80,7 +80,7 @@ class _Writing:
             conditional=tuple(self._conditional(action)),
         )
 
-    def _conditional(self, action: DraftAction) -> Iterator[ConditionalEffect]:
+    def _conditional(self, action: LiteralAction) -> Iterator[ConditionalEffect]:
         for change in action.changes:
             lost = {self._twin[fact] for fact in change.add & self._negated}
             sure = {
@@ -94,7 +94,7 @@ class _Writing:
         for fact in sorted(self._negated):
             yield from self._contested(action, fact)
 
-    def _contested(self, action: DraftAction, fact: int) -> Iterator[ConditionalEffect]:
+    def _contested(self, action: LiteralAction, fact: int) -> Iterator[ConditionalEffect]:
         """The twin of a fact that is deleted unless a condition adds it at the same time."""
         adders = _adders(action, fact)
         if not adders:
@@ -109,7 +109,9 @@ class _Writing:
                     twin_only = frozenset((self._twin[fact],))
                     yield ConditionalEffect(self._condition(both), twin_only, frozenset())
 
-    def _ways_not(self, action: DraftAction, adders: Iterable[DraftChange]) -> Iterator[Literals]:
+    def _ways_not(
+        self, action: LiteralAction, adders: Iterable[LiteralChange]
+    ) -> Iterator[Literals]:
         """The ways in which none of several changes happens."""
         choices = [tuple(_single_opposites(change.condition)) for change in adders]
         ways = 1
@@ -117,7 +119,7 @@ class _Writing:
             ways *= len(choice)
         if ways > _WAYS_LIMIT:
             message = f"the effects of {action.name!r} cancel each other in {ways} ways"
-            fix = "make actions of their own of the cases"
+            fix = "make a separate action of each case"
             raise FragmentRefused(Problem("PDDL_TOO_MANY", message, fix=fix))
         for way in product(*choices):
             combined = Literals()
@@ -134,27 +136,27 @@ def _single_opposites(condition: Literals) -> Iterator[Literals]:
         yield Literals(positive=frozenset((fact,)))
 
 
-def _adders(action: DraftAction, fact: int) -> list[DraftChange]:
+def _adders(action: LiteralAction, fact: int) -> list[LiteralChange]:
     return [change for change in action.changes if fact in change.add]
 
 
-def _conditions(draft: Draft) -> Iterator[Literals]:
-    yield draft.goal
-    for rule in draft.rules:
+def _conditions(literal_task: LiteralTask) -> Iterator[Literals]:
+    yield literal_task.goal
+    for rule in literal_task.rules:
         yield rule.body
-    for action in draft.actions:
+    for action in literal_task.actions:
         yield action.condition
         for change in action.changes:
             yield change.condition
 
 
-def _negated(draft: Draft) -> set[int]:
+def _negated(literal_task: LiteralTask) -> set[int]:
     """The facts that somewhere must be false, those included that decide who wins."""
-    negated = {fact for condition in _conditions(draft) for fact in condition.negative}
+    negated = {fact for condition in _conditions(literal_task) for fact in condition.negative}
     while True:
         more = {
             needed
-            for action in draft.actions
+            for action in literal_task.actions
             if action.changes
             for fact in negated & _deleted(action)
             for change in _adders(action, fact)
@@ -165,15 +167,15 @@ def _negated(draft: Draft) -> set[int]:
         negated |= more
 
 
-def _deleted(action: DraftAction) -> frozenset[int]:
+def _deleted(action: LiteralAction) -> frozenset[int]:
     return action.delete.union(*(change.delete for change in action.changes))
 
 
-def _mentioned(draft: Draft) -> set[int]:
-    facts = {rule.head for rule in draft.rules}
-    for condition in _conditions(draft):
+def _mentioned(literal_task: LiteralTask) -> set[int]:
+    facts = {rule.head for rule in literal_task.rules}
+    for condition in _conditions(literal_task):
         facts |= condition.positive | condition.negative
-    for action in draft.actions:
+    for action in literal_task.actions:
         facts |= action.add | action.delete
         for change in action.changes:
             facts |= change.add | change.delete

@@ -32,11 +32,11 @@ def fitted(
     make: Callable[[Merged], _T],
     left_out: Mapping[str, Problem] | None = None,
 ) -> Fitted[_T]:
-    """Make something of a merge, leaving out whoever brought what is widest in it as often as that
-    is needed; then let in again who is not to blame.
+    """Make something of a merge. As often as needed, leave out the component that brought what is
+    widest in it; then let in again those that are not the cause.
 
     `merged` is the merge of all `contributions`; `left_out` were left out before, and stay out.
-    Whatever `make` raises besides, it raises, and `TooManyBindings` where nobody can be left out.
+    Raises `TooManyBindings` where no component can be left out, and all else that `make` raises.
     """
     return _Fitting(tuple(contributions), merged.self_host, make).of(merged, dict(left_out or {}))
 

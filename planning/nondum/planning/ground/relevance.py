@@ -7,26 +7,26 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TypeAlias
 
-from nondum.planning.ground.draft import Draft, DraftAction, DraftRule
+from nondum.planning.ground.literal_task import LiteralAction, LiteralRule, LiteralTask
 from nondum.planning.pddl.literals import Literals
 
 Wish: TypeAlias = tuple[int, bool]
 """A fact, and whether it is to be true."""
 
 
-def helpful(draft: Draft) -> Draft:
+def helpful(literal_task: LiteralTask) -> LiteralTask:
     """The task without actions and rules that give nothing which anything else asks for.
 
     An effect that may undo something asked for makes it a wish that its condition does not hold.
     """
     givers: defaultdict[Wish, list[int]] = defaultdict(list)
-    for index, action in enumerate(draft.actions):
+    for index, action in enumerate(literal_task.actions):
         for wish in _given(action):
             givers[wish].append(index)
-    rules: defaultdict[int, list[DraftRule]] = defaultdict(list)
-    for rule in draft.rules:
+    rules: defaultdict[int, list[LiteralRule]] = defaultdict(list)
+    for rule in literal_task.rules:
         rules[rule.head].append(rule)
-    waiting = list(_wishes(draft.goal))
+    waiting = list(_wishes(literal_task.goal))
     asked = set(waiting)
     kept: set[int] = set()
 
@@ -41,19 +41,19 @@ def helpful(draft: Draft) -> Draft:
         for rule in rules.get(fact, ()):
             ask(_wishes(rule.body if is_true else _opposite(rule.body)))
         for index in givers.get(wish, ()):
-            action = draft.actions[index]
+            action = literal_task.actions[index]
             if index not in kept:
                 kept.add(index)
                 ask(_wishes(action.condition))
             ask(_asked_by_changes(action, wish))
         for index in givers.get((fact, not is_true), ()):
-            ask(_asked_against(draft.actions[index], (fact, not is_true)))
+            ask(_asked_against(literal_task.actions[index], (fact, not is_true)))
     asked_facts = {fact for fact, _ in asked}
-    actions = (draft.actions[index] for index in sorted(kept))
+    actions = (literal_task.actions[index] for index in sorted(kept))
     return replace(
-        draft,
+        literal_task,
         actions=tuple(actions),
-        rules=tuple(rule for rule in draft.rules if rule.head in asked_facts),
+        rules=tuple(rule for rule in literal_task.rules if rule.head in asked_facts),
     )
 
 
@@ -66,7 +66,7 @@ def _opposite(literals: Literals) -> Literals:
     return Literals(literals.negative, literals.positive)
 
 
-def _given(action: DraftAction) -> set[Wish]:
+def _given(action: LiteralAction) -> set[Wish]:
     wishes = {(fact, True) for fact in action.add} | {(fact, False) for fact in action.delete}
     for change in action.changes:
         wishes |= {(fact, True) for fact in change.add}
@@ -74,7 +74,7 @@ def _given(action: DraftAction) -> set[Wish]:
     return wishes
 
 
-def _asked_by_changes(action: DraftAction, wish: Wish) -> Iterator[Wish]:
+def _asked_by_changes(action: LiteralAction, wish: Wish) -> Iterator[Wish]:
     """What the changes that give a wish ask for."""
     fact, is_true = wish
     for change in action.changes:
@@ -82,7 +82,7 @@ def _asked_by_changes(action: DraftAction, wish: Wish) -> Iterator[Wish]:
             yield from _wishes(change.condition)
 
 
-def _asked_against(action: DraftAction, harm: Wish) -> Iterator[Wish]:
+def _asked_against(action: LiteralAction, harm: Wish) -> Iterator[Wish]:
     """What keeps the changes that would undo something from happening."""
     fact, is_true = harm
     for change in action.changes:

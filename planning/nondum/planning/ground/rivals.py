@@ -41,7 +41,7 @@ def conflict(says: Mapping[str, str], believed: str) -> Problem:
     told = ", ".join(f"{who} says ({fact})" for who, fact in sorted(says.items()))
     newest = f"; the newest is believed: ({believed})" if believed else ""
     return Problem(
-        "E-FACT-CONFLICT",
+        "PDDL_FACT_CONFLICT",
         f"only one of them can hold, but {told}{newest}",
         where=f"({group_of(min(says.values()))} …)",
         fix="see `nondum facts --why`, and unplug or mend the one that is wrong",

@@ -1,4 +1,4 @@
-"""Which schemas a goal can have to do with at all: asked before anything is bound."""
+"""Which schemas a goal can depend on, before anything is bound."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Wish: TypeAlias = tuple[str, bool, tuple[str, ...]]
 
 
 _MOST = 16
-"""So many patterns of one predicate are told apart; beyond them all its facts are asked for."""
+"""Patterns of one predicate, at most; beyond them all its facts are asked for."""
 
 
 @dataclass(frozen=True, slots=True)
-class Concern:
+class RelevantPart:
     """The part of a domain that a goal depends on."""
 
     merged: Merged
@@ -69,7 +69,7 @@ class Wishes:
         return False
 
 
-def concern(merged: Merged, goal: GoalExpr) -> Concern:
+def relevant_part(merged: Merged, goal: GoalExpr) -> RelevantPart:
     """Go back from the goal to everything that gives what is asked for.
 
     Objects that the goal names are passed on to the schemas that it asks, and on by them: a goal
@@ -109,7 +109,7 @@ def concern(merged: Merged, goal: GoalExpr) -> Concern:
         merged.domain,
         actions={name: a for name, a in merged.domain.actions.items() if name in actions},
     )
-    return Concern(replace(merged, domain=domain), wishes)
+    return RelevantPart(replace(merged, domain=domain), wishes)
 
 
 def _matched(atom: Atom, row: Row) -> dict[str, str] | None:

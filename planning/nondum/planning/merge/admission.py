@@ -1,7 +1,7 @@
 """Letting components into a merge one by one, each whole or not at all.
 
-Rules M2-M14 of merging: words are shared by plain name; whoever comes first in precedence has the
-say, and what contradicts it is kept out, with both places named.
+Rules M2-M14 of merging: words are shared by plain name; the first component in precedence
+decides, and what contradicts it is kept out, with both places named.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _join_types(agreed: Agreement, claims: Claims, report: Report) -> None:
         named = [claim for claim in claims.types if claim.name in cycle]
         others = _places(o for name in cycle for o in agreed.type_origins.get(name, ()))
         message = f"types in a circle: {cycle_text(cycle)}, together with {others}"
-        report.problem("E-TYPE-CYCLE", message, _place(named[0].origin))
+        report.problem("PDDL_TYPE_CYCLE", message, _place(named[0].origin))
         return
     for claim in claims.types:
         known = agreed.parents.get(claim.name, frozenset())
@@ -98,7 +98,7 @@ def _join_types(agreed: Agreement, claims: Claims, report: Report) -> None:
                 f"type {claim.name!r} is a kind of {type_text(tuple(sorted(claim.parents)))} here,"
                 f" of {type_text(tuple(sorted(known)))} in {others}"
             )
-            report.problem("E-TYPE-PARENT", message, _place(claim.origin), "choose another name")
+            report.problem("PDDL_TYPE_PARENT", message, _place(claim.origin), "choose another name")
         origins = agreed.type_origins.get(claim.name, ())
         agreed.type_origins[claim.name] = (*origins, claim.origin)
 
@@ -126,7 +126,7 @@ def _join_signatures(
                 f"{kind} {claim.name!r}: {claim.arity} arguments here,"
                 f" {known.arity} in {_places(known.origins)}"
             )
-            report.problem("E-PRED-ARITY", message, _place(claim.origins[0]), "choose another name")
+            report.problem("PDDL_ARITY", message, _place(claim.origins[0]), "choose another name")
             continue
         agreed[claim.name] = replace(
             known,
@@ -139,13 +139,13 @@ def _join_signatures(
 
 
 def _value_type(known: Predicate, claim: Predicate, kind: str, report: Report) -> str:
-    """The type of message that both say the value is (E-PRED-TYPE); who says none agrees."""
+    """The type of message that both say the value is (PDDL_SIGNATURE); who says none agrees."""
     if known.value_type and claim.value_type and known.value_type != claim.value_type:
         message = (
             f"{kind} {claim.name!r}: its value is a {claim.value_type} here,"
             f" a {known.value_type} in {_places(known.origins)}"
         )
-        report.problem("E-PRED-TYPE", message, _place(claim.origins[0]), "choose another name")
+        report.problem("PDDL_SIGNATURE", message, _place(claim.origins[0]), "choose another name")
     return known.value_type or claim.value_type
 
 
@@ -161,9 +161,9 @@ def _wider(
         )
         place = _place(claim.origins[0])
         if not graph.comparable(mine, theirs):
-            report.problem("E-PRED-TYPE", difference, place, "choose another name")
+            report.problem("PDDL_SIGNATURE", difference, place, "choose another name")
         elif set(mine) != set(theirs):
-            report.warning("E-PRED-TYPE", f"{difference}; taken as the wider one", place)
+            report.warning("PDDL_SIGNATURE", f"{difference}; taken as the wider one", place)
         wider.append(theirs if graph.all_kind_of(mine, theirs) else mine)
     return tuple(wider)
 
@@ -179,7 +179,7 @@ def _join_objects(agreed: Agreement, claims: Claims, graph: TypeGraph, report: R
                 f"{claim.name!r} is {type_text(claim.types)} here,"
                 f" {type_text(known.types)} in {_places(known.origins) or 'this robot'}"
             )
-            report.problem("E-OBJ-TYPE", message, _place(claim.origin), "choose another name")
+            report.problem("PDDL_OBJECT_TYPE", message, _place(claim.origin), "choose another name")
             continue
         is_closer = graph.all_kind_of(claim.types, known.types)
         agreed.objects[claim.name] = replace(
@@ -197,13 +197,13 @@ def _join_actions(agreed: Agreement, claims: Claims, report: Report) -> None:
         if known != action:
             message = f"action {action.name!r} differs from the one in {_places(known.origins)}"
             fix = "run one version of the plugin on this host"
-            report.problem("E-VERSION", message, _place(action.origins[0]), fix)
+            report.problem("PDDL_VERSION", message, _place(action.origins[0]), fix)
             continue
         agreed.actions[action.name] = replace(known, origins=known.origins + action.origins)
 
 
 def _join_derived(agreed: Agreement, claims: Claims, report: Report) -> None:
-    """Derived predicates are written by rules alone, whoever brings them."""
+    """Derived predicates are written by rules alone, of whichever component."""
     written = dict(_written(claims))
     agreed.written |= {name: by for name, by in written.items() if name not in agreed.written}
     agreed.derived += claims.derived
@@ -217,13 +217,13 @@ def _join_derived(agreed: Agreement, claims: Claims, report: Report) -> None:
         message = f"these hold only if they do not: {', '.join(circle)}"
         fix = "take a negation out of the circle"
         origin = next(r.origins[0] for r in claims.derived if r.head.predicate in circle)
-        report.problem("E-DERIVED", message, _place(origin), fix)
+        report.problem("PDDL_DERIVED", message, _place(origin), fix)
 
 
 def _refuse_written(name: str, mine: Origin, other: Origin, report: Report) -> None:
     message = f"{name!r} follows from rules in one place and is written in another: {other}"
     fix = "use another predicate for what is written"
-    report.problem("E-DERIVED", message, _place(mine), fix)
+    report.problem("PDDL_DERIVED", message, _place(mine), fix)
 
 
 def _written(claims: Claims) -> Iterator[tuple[str, Origin]]:

@@ -97,7 +97,7 @@ def _parsed(contribution: Contribution, report: Report) -> list[FragmentSyntax]:
             continue
         if isinstance(parsed, ProblemFragment) and parsed.goal is not None:
             message = "a fragment has no goal: people give goals"
-            report.problem("E-GOAL", message, parsed.goal.place, "declare a phrase for the goal")
+            report.problem("PDDL_GOAL", message, parsed.goal.place, "declare a phrase for the goal")
         fragments.append(parsed)
     return fragments
 
@@ -110,7 +110,9 @@ def _actions(
     for action in declared:
         if action is not first[action.name]:
             message = f"action {action.name!r} is declared twice, first at"
-            scope.report.problem("E-TWICE", f"{message} {first[action.name].place}", action.place)
+            scope.report.problem(
+                "PDDL_TWICE", f"{message} {first[action.name].place}", action.place
+            )
     behaviours = behaviours_of(contribution, first, scope.report)
     schemas = (
         schema_of(action, contribution.plugin, behaviours.get(action.name), scope)

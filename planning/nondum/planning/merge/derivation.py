@@ -24,7 +24,7 @@ class Strata:
 
 
 def derived_of(domains: Iterable[DomainFragment], scope: Scope) -> tuple[DerivedRule, ...]:
-    """The rules that one component declares (E-UNDECL, E-OWNED, and the codes of conditions)."""
+    """The rules of one component (PDDL_UNKNOWN, PDDL_OWNED, and the codes of conditions)."""
     declared = (rule for domain in domains for rule in domain.derived)
     rules = (_rule(declaration, scope) for declaration in declared)
     return tuple(rule for rule in rules if rule)
@@ -97,7 +97,7 @@ def _needs(rule: DerivedRule) -> Iterator[tuple[str, bool]]:
 
 def _circle(raised_by: Mapping[str, str], last: str) -> tuple[str, ...]:
     """What raises itself without end, the first by name first."""
-    for _ in raised_by:  # whoever rises last may only hang on a circle
+    for _ in raised_by:  # the last to rise may only hang on a circle
         last = raised_by[last]
     circle = [last]
     while raised_by[circle[-1]] != last:

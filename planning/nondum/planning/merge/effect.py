@@ -65,8 +65,8 @@ class Effect:
 def effect_of(formula: Formula, parameters: Iterable[str] = (), *, unnamed_cost: int = 1) -> Effect:
     """Read an effect of an action with `parameters`. One that names no cost has `unnamed_cost`.
 
-    Quantified variables that hide others are renamed. Raises `Misplaced` (E-UNSUPPORTED,
-    E-MISPLACED).
+    Quantified variables that hide others are renamed. Raises `Misplaced` (PDDL_UNSUPPORTED,
+    PDDL_MISPLACED).
     """
     found = _Reading(frozenset(parameters))
     found.read(formula, _Where())
@@ -123,10 +123,10 @@ class _Reading:
                 self.increases.append(formula)
             case Numeric():
                 message = "a cost that depends on a condition is not handled"
-                raise Misplaced("E-UNSUPPORTED", message, formula.place)
+                raise Misplaced("PDDL_UNSUPPORTED", message, formula.place)
             case _:
                 message = f"{_called(formula)} is not an effect"
-                raise Misplaced("E-MISPLACED", message, formula.place)
+                raise Misplaced("PDDL_MISPLACED", message, formula.place)
 
     def _apart(self, formula: Quantified, where: _Where) -> tuple[tuple[TypedName, ...], Formula]:
         """The variables and the part, renamed where they would hide others."""
@@ -151,7 +151,7 @@ class _Reading:
                         f"numeric effect {increase} is not handled,"
                         " only whole numbers below 2^53 and functions added to total-cost"
                     )
-                    raise Misplaced("E-UNSUPPORTED", message, increase.place)
+                    raise Misplaced("PDDL_UNSUPPORTED", message, increase.place)
         return cost, tuple(functions)
 
 

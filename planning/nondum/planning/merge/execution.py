@@ -19,7 +19,7 @@ def behaviours_of(
 ) -> dict[str, Behaviour]:
     """Action → the behaviour that carries it out; none where behaviours are not known.
 
-    Adds E-BEHAVIOUR for a behaviour without its action, an action without a behaviour, two
+    Adds PDDL_BEHAVIOUR for a behaviour without its action, an action without a behaviour, two
     behaviours for one action, and parameters that differ.
     """
     if contribution.behaviours is None:
@@ -35,7 +35,9 @@ def behaviours_of(
     for action in actions.values():
         if action.name not in found:
             message = f"no behaviour carries out action {action.name!r}"
-            report.problem("E-BEHAVIOUR", message, action.place, "decorate the function that does")
+            report.problem(
+                "PDDL_BEHAVIOUR", message, action.place, "decorate the function that does"
+            )
     return found
 
 
@@ -65,4 +67,4 @@ def _plain(parameters: tuple[TypedName, ...]) -> list[tuple[str, tuple[str, ...]
 
 def _refuse(behaviour: Behaviour, message: str, report: Report, fix: str = "") -> None:
     where = f"{report.by} behaviour {behaviour.name!r}"
-    report.problems.append(Problem("E-BEHAVIOUR", message, where=where, fix=fix))
+    report.problems.append(Problem("PDDL_BEHAVIOUR", message, where=where, fix=fix))

@@ -96,7 +96,7 @@ def of_plugin(
     return next(name for name in every if name not in others or len({*words, *others[name]}) == 1)
 
 
-def plugins_of_others(names: Mapping[str, GivenNames], payload_id: str) -> frozenset[str]:
+def plugins_of_other_payloads(names: Mapping[str, GivenNames], payload_id: str) -> frozenset[str]:
     """The names that were given to plugins of all payloads but one, other than their own."""
     return frozenset(
         name

@@ -18,7 +18,7 @@ GoalExpr: TypeAlias = Condition
 """Facts that must hold, must not hold, and objects that must be equal or not; no variables."""
 
 GoalKind: TypeAlias = Literal["achieve", "do", "maintain"]
-"""`achieve`: it is made true once. `do`: the same, from anew each time that it is asked for: what
+"""`achieve`: it is made true once. `do`: the same, again each time that it is asked for: what
 behaviours that have ended once made true of it does not count. `maintain`: it is kept true."""
 
 FILE = "goal"
@@ -42,7 +42,7 @@ class Goal:
 def parse_goal(text: str, merged: Merged, *, kind: GoalKind = "achieve") -> Goal:
     """Read a goal written in PDDL: `(pointing self radiation-source)`.
 
-    Raises `GoalRefused`: the codes of syntax, E-UNDECL, E-TYPE, E-PRED-ARITY, E-UNSUPPORTED.
+    Raises `GoalRefused`: PDDL_UNKNOWN, PDDL_TYPE, PDDL_ARITY, PDDL_UNSUPPORTED, those of syntax.
     """
     try:
         condition = condition_of(parse_formula(text, FILE))

@@ -52,7 +52,7 @@ class FactClaim:
 
 
 def own_objects(contribution: Contribution, scope: Scope) -> dict[str, tuple[str, ...]]:
-    """The component's units and streams and its host, with their types (E-UNDECL, E-TYPE)."""
+    """The component's units, streams and host, with their types (PDDL_UNKNOWN, PDDL_TYPE)."""
     found: dict[str, tuple[str, ...]] = {contribution.host: ("host",)}
     for unit in contribution.units:
         _check_kind(unit, unit.local, "unit", scope)
@@ -69,16 +69,16 @@ def _check_kind(owned: UnitObject | StreamObject, local: str, kind: str, scope: 
 
 
 def kind_problems(type: str, kind: str, where: str, graph: TypeGraph) -> Iterator[Problem]:
-    """What is wrong with a type that is to be a kind of another one (E-UNDECL, E-TYPE)."""
+    """What is wrong with a type that is to be a kind of another one (PDDL_UNKNOWN, PDDL_TYPE)."""
     if type not in graph:
         fix = nearest(type, graph.parents)
-        yield Problem("E-UNDECL", f"nobody declares type {type!r}", where=where, fix=fix)
+        yield Problem("PDDL_UNKNOWN", f"type {type!r} is not declared", where=where, fix=fix)
     elif not graph.is_kind_of(type, kind):
-        yield Problem("E-TYPE", f"type {type!r} is not a kind of {kind}", where=where)
+        yield Problem("PDDL_TYPE", f"type {type!r} is not a kind of {kind}", where=where)
 
 
 def objects_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ObjectClaim, ...]:
-    """The shared objects declared (E-UNDECL, E-OWNED, E-OBJ-TYPE, E-TWICE)."""
+    """The shared objects declared (PDDL_UNKNOWN, PDDL_OWNED, PDDL_OBJECT_TYPE, PDDL_TWICE)."""
     claims: dict[str, ObjectClaim] = {}
     for declared in scope.checked_types(_declarations(fragments)):
         types = types_or_root(declared.types)
@@ -92,7 +92,7 @@ def objects_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[Objec
             known = claims.setdefault(name, claim)
             if known.types != types:
                 message = f"{name!r} is {type_text(known.types)} at {known.origin.place}"
-                scope.report.problem("E-TWICE", message, declared.place)
+                scope.report.problem("PDDL_TWICE", message, declared.place)
     return tuple(claims.values())
 
 
@@ -109,17 +109,17 @@ def _check_own(
 ) -> None:
     if types != (ROOT,) and not scope.graph.all_kind_of(own, types):
         message = f"{declared.name!r} is {type_text(own)}, not {type_text(types)}"
-        scope.report.problem("E-OBJ-TYPE", message, declared.place)
+        scope.report.problem("PDDL_OBJECT_TYPE", message, declared.place)
 
 
 def _refuse_foreign(name: str, at: TypedName | Atom, scope: Scope) -> None:
     message = f"{name!r} has the form of another component's unit or stream"
     fix = f"names of shared objects have no {OWNED_MARK!r}; own units go by their local names"
-    scope.report.problem("E-OWNED", message, at.place, fix)
+    scope.report.problem("PDDL_OWNED", message, at.place, fix)
 
 
 def facts_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[FactClaim, ...]:
-    """The facts asserted (E-UNDECL, E-TYPE, E-PRED-ARITY, E-OWNED, E-INIT).
+    """The facts asserted (PDDL_UNKNOWN, PDDL_TYPE, PDDL_ARITY, PDDL_OWNED, PDDL_INIT).
 
     A fact may name objects that this component does not declare: it waits until they are there.
     """
@@ -137,12 +137,12 @@ def _asserted(formula: Formula, scope: Scope) -> Atom | None:
     if isinstance(formula, Atom):
         return formula
     if not isinstance(formula, Numeric) or formula.operator != "=":
-        scope.report.problem("E-INIT", f"{formula} is not a fact", formula.place)
+        scope.report.problem("PDDL_INIT", f"{formula} is not a fact", formula.place)
     return None
 
 
 def values_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ValueClaim, ...]:
-    """The values given to functions (E-UNDECL, E-TYPE, E-PRED-ARITY, E-INIT, E-TWICE).
+    """The values given to functions (PDDL_UNKNOWN, PDDL_TYPE, PDDL_ARITY, PDDL_INIT, PDDL_TWICE).
 
     `total-cost` is a plan's own, and begins with 0 whatever is said.
     """
@@ -155,21 +155,21 @@ def values_of(fragments: Sequence[FragmentSyntax], scope: Scope) -> tuple[ValueC
                 case Numeric("=", Atom() as function, float(value)):
                     if not is_exact(value):
                         message = f"{formula}: only whole numbers below 2^53 are handled"
-                        scope.report.problem("E-INIT", message, formula.place)
+                        scope.report.problem("PDDL_INIT", message, formula.place)
                     elif scope.check_function(function, {}):
                         text = bind(function, _resolved(function, scope))
                         claim = ValueClaim(text, int(value), scope.report.origin(formula.place))
                         _check_agrees(claim, claims.setdefault(text, claim), formula, scope)
                 case Numeric(operator="="):
                     message = f"{formula} gives no function a number"
-                    scope.report.problem("E-INIT", message, formula.place)
+                    scope.report.problem("PDDL_INIT", message, formula.place)
     return tuple(claims.values())
 
 
 def _check_agrees(claim: ValueClaim, known: ValueClaim, formula: Numeric, scope: Scope) -> None:
     if claim.value != known.value:
         message = f"({claim.function}) is {known.value} at {known.origin.place}"
-        scope.report.problem("E-TWICE", message, formula.place)
+        scope.report.problem("PDDL_TWICE", message, formula.place)
 
 
 def _resolved(atom: Atom, scope: Scope) -> dict[str, str]:

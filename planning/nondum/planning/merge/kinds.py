@@ -15,8 +15,8 @@ from nondum.sdk.errors import FragmentRefused
 def kinds_of(description: PluginDescription) -> Callable[[str], frozenset[str]]:
     """Give a function: type → itself and all types above it, as the plugin declares them.
 
-    Fragments are read only where one of its units has a type of its own; one that cannot be read
-    declares nothing (planning tells what is wrong with it).
+    Fragments are read only where a unit of the plugin has a type that it declares; one that cannot
+    be read declares nothing (planning tells what is wrong with it).
     """
     graph = core_graph()
     types = {unit.type for unit in description.units}

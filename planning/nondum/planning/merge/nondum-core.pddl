@@ -11,7 +11,7 @@
     (self ?h - host)                             ; H the host that plans
     (on ?u - unit ?h - host)                     ; H the unit is part of that body
     (ready ?u - unit)                            ; H its component is healthy, its devices are there
-    (idle ?u - unit)                             ; H nobody uses it, or not as many as it serves
+    (idle ?u - unit)                             ; H nothing uses it, or not as many as it serves
     (output ?u - unit ?s - stream)               ; H an output slot of the unit
     (free ?s - stream)                           ; H the slot is unused
     (flowing ?s - stream)                        ; P messages arrive

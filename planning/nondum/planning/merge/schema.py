@@ -84,7 +84,7 @@ def _check_actor(declared: ActionDeclaration, scope: Scope) -> None:
     message = f"the first parameter of {declared.name!r} is not a unit"
     fix = "the first parameter is the actor: add one, such as ?u - camera"
     place = actor[0].place if actor else declared.place
-    scope.report.problem("E-ACTOR", message, place, fix)
+    scope.report.problem("PDDL_ACTOR", message, place, fix)
 
 
 def _check_instances(declared: ActionDeclaration, scope: Scope) -> None:
@@ -92,7 +92,7 @@ def _check_instances(declared: ActionDeclaration, scope: Scope) -> None:
         if term.name == SELF or term.name in scope.locals:
             message = f"{term.name!r} names one instance, and an action serves all of them"
             fix = "use a parameter, such as ?h - host with (on ?u ?h)"
-            scope.report.problem("E-INSTANCE", message, term.place, fix)
+            scope.report.problem("PDDL_INSTANCE", message, term.place, fix)
 
 
 def _check_lasting(
@@ -101,8 +101,8 @@ def _check_lasting(
     """What holds only while a behaviour runs cannot depend on how things were when it began."""
     if lasting and effect.conditional:
         message = f"{declared.name!r} is lasting, and has effects under conditions"
-        fix = "make an action of its own for each case"
-        scope.report.problem("E-UNSUPPORTED", message, declared.place, fix)
+        fix = "make a separate action for each case"
+        scope.report.problem("PDDL_UNSUPPORTED", message, declared.place, fix)
 
 
 def _takes_something(effect: Effect) -> bool:

@@ -1,7 +1,7 @@
 """What the names in one component's fragments mean, and the problems found on the way.
 
-A fragment may use the core's words, those that the fragments of its own component declare, and
-nothing else: so a stranger who leaves takes no meaning with it.
+A fragment may use the core's words, those that the fragments of the same component declare, and
+nothing else: so a component that leaves takes no meaning away from the rest.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Variables: TypeAlias = Mapping[str, tuple[str, ...]]
 """The variables that may be used, with their types."""
 
 PROBLEMS_LIMIT = 50
-"""So many problems of one component are told at once."""
+"""Problems of one component that are told at once, at most."""
 
 
 class TooManyProblems(Exception):
@@ -105,7 +105,7 @@ class Scope:
         return self.host if name == SELF else self.locals.get(name, name)
 
     def checked_types(self, names: Iterable[TypedName]) -> tuple[TypedName, ...]:
-        """The names, their types checked (E-UNDECL).
+        """The names, their types checked (PDDL_UNKNOWN).
 
         What is of an undeclared type counts as an object, so that one mistake is told once.
         """
@@ -118,11 +118,11 @@ class Scope:
         unknown = [name for name in types if name not in self.graph]
         for name in unknown:
             fix = nearest(name, self.graph.parents) or "declare it in :types"
-            self.report.problem("E-UNDECL", f"nobody declares type {name!r}", place, fix)
+            self.report.problem("PDDL_UNKNOWN", f"type {name!r} is not declared", place, fix)
         return not unknown
 
     def check_formula(self, formula: Formula, variables: Variables) -> None:
-        """Check every name in a condition or effect (E-UNDECL, E-PRED-ARITY, E-TYPE, E-TWICE)."""
+        """Check each name of a formula: PDDL_UNKNOWN, PDDL_ARITY, PDDL_TYPE, PDDL_TWICE."""
         match formula:
             case Atom():
                 self.check_atom(formula, variables)
@@ -148,7 +148,7 @@ class Scope:
                 self.check_function(function, variables)
 
     def check_atom(self, atom: Atom, variables: Variables) -> bool:
-        """Check predicate, arity, names and types of an atom (E-UNDECL, E-PRED-ARITY, E-TYPE)."""
+        """Check predicate, arity, names and types: PDDL_UNKNOWN, PDDL_ARITY, PDDL_TYPE."""
         return self._check_use(atom, "predicate", self.predicates, variables)
 
     def check_function(self, atom: Atom, variables: Variables) -> bool:
@@ -161,12 +161,12 @@ class Scope:
         predicate = declared.get(atom.predicate)
         if predicate is None:
             fix = nearest(atom.predicate, declared) or f"declare it in :{kind}s"
-            message = f"nobody declares {kind} {atom.predicate!r}"
-            self.report.problem("E-UNDECL", message, atom.place, fix)
+            message = f"{kind} {atom.predicate!r} is not declared"
+            self.report.problem("PDDL_UNKNOWN", message, atom.place, fix)
             return False
         if len(atom.terms) != predicate.arity:
             message = f"{atom} has {len(atom.terms)} arguments, {_declared(predicate)}"
-            self.report.problem("E-PRED-ARITY", message, atom.place)
+            self.report.problem("PDDL_ARITY", message, atom.place)
             return False
         return all(
             [
@@ -176,25 +176,25 @@ class Scope:
         )
 
     def check_term(self, term: Term, types: tuple[str, ...], variables: Variables) -> bool:
-        """Check that a term means something that can be one of `types` (E-UNDECL, E-TYPE)."""
+        """Check that a term is something of one of `types` (PDDL_UNKNOWN, PDDL_TYPE)."""
         found = variables.get(term.name) or self.objects.get(self.resolve(term.name))
         if found is None:
             if term.is_variable:
                 message = f"{term} is not a parameter"
                 fix = nearest(term.name, variables)
             else:
-                message = f"nobody declares {term.name!r}"
+                message = f"{term.name!r} is not declared"
                 fix = nearest(term.name, [*self.objects, *self.locals, SELF])
-            self.report.problem("E-UNDECL", message, term.place, fix)
+            self.report.problem("PDDL_UNKNOWN", message, term.place, fix)
             return False
         if not self.graph.may_be(found, types):
             message = f"expected {type_text(types)}, {term} is {type_text(found)}"
-            self.report.problem("E-TYPE", message, term.place)
+            self.report.problem("PDDL_TYPE", message, term.place)
             return False
         return True
 
     def check_ownership(self, effect: Effect, *, lasting: bool) -> None:
-        """Check that an effect writes nothing that is the host's (E-OWNED).
+        """Check that an effect writes nothing that is the host's (PDDL_OWNED).
 
         A lasting action may delete `idle` and `free`: so it takes them for as long as it runs.
         """
@@ -206,13 +206,13 @@ class Scope:
             elif not lasting:
                 message = f"only a lasting behaviour may take {atom}"
                 fix = "make the behaviour lasting, or leave the effect out"
-                self.report.problem("E-OWNED", message, atom.place, fix)
+                self.report.problem("PDDL_OWNED", message, atom.place, fix)
 
     def check_writable(self, atom: Atom) -> None:
-        """Check that a plugin may write an atom (E-OWNED)."""
+        """Check that a plugin may write an atom (PDDL_OWNED)."""
         if atom.predicate in self.of_host:
             message = f"{atom.predicate!r} is the host's to say; plugins may only read it"
-            self.report.problem("E-OWNED", message, atom.place)
+            self.report.problem("PDDL_OWNED", message, atom.place)
 
 
 def _declared(predicate: Predicate) -> str:

@@ -33,7 +33,7 @@ class TypeClaim:
 
 
 def types_of(domains: Sequence[DomainFragment], report: Report) -> tuple[TypeClaim, ...]:
-    """The types beyond the core's (E-TYPE-PARENT, E-TYPE-CYCLE, E-TWICE, PDDL_TOO_MANY).
+    """The types beyond the core's (PDDL_TYPE_PARENT, PDDL_TYPE_CYCLE, PDDL_TWICE, PDDL_TOO_MANY).
 
     Undeclared parents are declared under `object`, with a warning.
     """
@@ -50,14 +50,14 @@ def types_of(domains: Sequence[DomainFragment], report: Report) -> tuple[TypeCla
         known = claims.setdefault(type_.name, claim)
         if known.parents != claim.parents:
             message = f"type {type_.name!r} has other parents at {known.origin.place}"
-            report.problem("E-TWICE", message, type_.place)
+            report.problem("PDDL_TWICE", message, type_.place)
     for type_ in declared:
         for parent in sorted(set(type_.types) - claims.keys()):
             if parent not in core_graph():
                 claims[parent] = TypeClaim(parent, frozenset(), report.origin(type_.place))
                 fix = nearest(parent, core_graph().parents) or "declare it in :types"
                 message = f"type {parent!r} is not declared; taken as an object"
-                report.warning("E-UNDECL", message, type_.place, fix)
+                report.warning("PDDL_UNKNOWN", message, type_.place, fix)
     _check_cycle(claims, report)
     return tuple(claims.values())
 
@@ -71,14 +71,14 @@ def _is_core(type_: TypedName, report: Report) -> bool:
     elif not set(type_.types) <= core_graph().ancestors(type_.name):
         parents = type_text(tuple(sorted(core_graph().parents[type_.name])))
         message = f"in the core, {type_.name!r} is a kind of {parents}"
-        report.problem("E-TYPE-PARENT", message, type_.place, "choose another name")
+        report.problem("PDDL_TYPE_PARENT", message, type_.place, "choose another name")
     return True
 
 
 def check_root(type_: TypedName, report: Report) -> None:
-    """Check that `object` is not declared below another type (E-TYPE-CYCLE)."""
+    """Check that `object` is not declared below another type (PDDL_TYPE_CYCLE)."""
     if set(type_.types) - {ROOT}:
-        report.problem("E-TYPE-CYCLE", "'object' is above all types", type_.place)
+        report.problem("PDDL_TYPE_CYCLE", "'object' is above all types", type_.place)
 
 
 def _check_cycle(claims: dict[str, TypeClaim], report: Report) -> None:
@@ -86,7 +86,7 @@ def _check_cycle(claims: dict[str, TypeClaim], report: Report) -> None:
     if cycle:
         place = claims[cycle[0]].origin.place
         assert place is not None, "claims of fragments have a place"
-        report.problem("E-TYPE-CYCLE", f"types in a circle: {cycle_text(cycle)}", place)
+        report.problem("PDDL_TYPE_CYCLE", f"types in a circle: {cycle_text(cycle)}", place)
 
 
 def cycle_text(cycle: tuple[str, ...]) -> str:
@@ -99,7 +99,7 @@ def cycle_text(cycle: tuple[str, ...]) -> str:
 
 
 def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
-    """The predicates beyond the core's (E-UNDECL, E-PRED-ARITY, E-PRED-TYPE)."""
+    """The predicates beyond the core's (PDDL_UNKNOWN, PDDL_ARITY, PDDL_SIGNATURE)."""
     valued = _valued(domains, scope)
     functional = {name.name for name in _marked("functional", domains, scope)}
     found: dict[str, Predicate] = {}
@@ -120,7 +120,7 @@ def predicates_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Pred
 
 
 def functions_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predicate, ...]:
-    """The functions declared, `total-cost` included (E-UNDECL, E-TWICE)."""
+    """The functions declared, `total-cost` included (PDDL_UNKNOWN, PDDL_TWICE)."""
     found: dict[str, Predicate] = {}
     for declared in (function for domain in domains for function in domain.functions):
         origin = scope.report.origin(declared.place)
@@ -128,12 +128,12 @@ def functions_of(domains: Sequence[DomainFragment], scope: Scope) -> tuple[Predi
         known = found.setdefault(declared.name, function)
         if known.parameters != function.parameters:
             message = f"function {declared.name!r} has other parameters at {known.origins[0].place}"
-            scope.report.problem("E-TWICE", message, declared.place)
+            scope.report.problem("PDDL_TWICE", message, declared.place)
     return tuple(found.values())
 
 
 def checked(declared: PredicateDeclaration, scope: Scope) -> PredicateDeclaration:
-    """A predicate or function, the types of its parameters checked (E-UNDECL)."""
+    """A predicate or function, the types of its parameters checked (PDDL_UNKNOWN)."""
     return replace(declared, parameters=scope.checked_types(declared.parameters))
 
 
@@ -143,7 +143,7 @@ def _compare(
     other = f"as {known.origins[0]} declares it"
     if predicate.arity != known.arity:
         message = f"predicate {known.name!r}: {predicate.arity} arguments, {known.arity} {other}"
-        scope.report.problem("E-PRED-ARITY", message, declared.place, "choose another name")
+        scope.report.problem("PDDL_ARITY", message, declared.place, "choose another name")
         return
     for position, (mine, theirs) in enumerate(
         zip(predicate.parameters, known.parameters, strict=True), 1
@@ -153,18 +153,18 @@ def _compare(
                 f"predicate {known.name!r}, argument {position}: {type_text(mine)},"
                 f" {type_text(theirs)} {other}"
             )
-            scope.report.problem("E-PRED-TYPE", message, declared.place, "choose another name")
+            scope.report.problem("PDDL_SIGNATURE", message, declared.place, "choose another name")
 
 
 def _valued(domains: Sequence[DomainFragment], scope: Scope) -> dict[str, str]:
-    """Valued predicate → the type of message that its value is, or nothing (E-UNDECL, E-TYPE)."""
+    """Valued predicate → the message type of its value, or nothing (PDDL_UNKNOWN, PDDL_TYPE)."""
     found: dict[str, str] = {}
     for name in _marked("valued", domains, scope):
         assert isinstance(name, TypedName)
         types = name.types
         if len(types) > 1 or (types and types[0] not in MESSAGES):
             message = f"the value of {name.name!r} is of no message type: {type_text(types)}"
-            scope.report.problem("E-TYPE", message, name.place, nearest(types[0], MESSAGES))
+            scope.report.problem("PDDL_TYPE", message, name.place, nearest(types[0], MESSAGES))
         else:
             found[name.name] = types[0] if types else ""
     return found
@@ -181,4 +181,4 @@ def _marked(
             else:
                 message = f"{name.name!r} in :{section} is no predicate that this plugin declares"
                 fix = nearest(name.name, declared)
-                scope.report.problem("E-UNDECL", message, name.place, fix)
+                scope.report.problem("PDDL_UNKNOWN", message, name.place, fix)

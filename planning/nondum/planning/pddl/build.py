@@ -84,7 +84,7 @@ class Builder(Transformer[Token, Any]):
         for item in items:
             if isinstance(item, _OfType):
                 if not waiting:
-                    raise Misplaced("E-SYNTAX", "expected a name before '-'", item.place)
+                    raise Misplaced("PDDL_SYNTAX", "expected a name before '-'", item.place)
                 typed += (TypedName(str(t), item.types, self._place(t)) for t in waiting)
                 waiting = []
             else:
@@ -166,13 +166,15 @@ class Builder(Transformer[Token, Any]):
     def metric(self, children: list[Any]) -> _Section:
         if children[1] == "maximize":
             raise Misplaced(
-                "E-UNSUPPORTED", "metrics that maximize are not handled", self._place(children[1])
+                "PDDL_UNSUPPORTED",
+                "metrics that maximize are not handled",
+                self._place(children[1]),
             )
         wanted = children[2]
         name = wanted.predicate if isinstance(wanted, Atom) else str(wanted)
         if name != "total-cost":
             message = f"metric {name!r} is not handled, only total-cost"
-            raise Misplaced("E-UNSUPPORTED", message, self._place(children[1]))
+            raise Misplaced("PDDL_UNSUPPORTED", message, self._place(children[1]))
         return self._section(children, name)
 
     def _section(self, children: Sequence[Any], content: Any) -> _Section:
@@ -218,7 +220,7 @@ def _once(sections: Iterable[_Section]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for section in sections:
         if section.kind in found:
-            raise Misplaced("E-TWICE", f"a second :{section.kind}", section.place)
+            raise Misplaced("PDDL_TWICE", f"a second :{section.kind}", section.place)
         found[section.kind] = section.content
     return found
 
@@ -227,5 +229,5 @@ def _refuse_repeated(names: Sequence[TypedName], what: str) -> None:
     seen: set[str] = set()
     for name in names:
         if name.name in seen:
-            raise Misplaced("E-TWICE", f"{what} {name.name} stands here twice", name.place)
+            raise Misplaced("PDDL_TWICE", f"{what} {name.name} stands here twice", name.place)
         seen.add(name.name)

@@ -51,14 +51,14 @@ class Condition:
 
 
 def condition_of(formula: Formula) -> Condition:
-    """Read a condition. Raises `Misplaced` (E-UNSUPPORTED, E-MISPLACED)."""
+    """Read a condition. Raises `Misplaced` (PDDL_UNSUPPORTED, PDDL_MISPLACED)."""
     return _literals(normal(formula))
 
 
 def normal(formula: Formula, *, negated: bool = False) -> Formula:
     """A condition, or its negation, made of literals, `and`, `or` and quantifiers.
 
-    Raises `Misplaced` (E-UNSUPPORTED, E-MISPLACED).
+    Raises `Misplaced` (PDDL_UNSUPPORTED, PDDL_MISPLACED).
     """
     match formula:
         case Atom() | Equal():
@@ -79,10 +79,10 @@ def normal(formula: Formula, *, negated: bool = False) -> Formula:
             return Quantified(quantifier, formula.variables, part, formula.place)
         case When():
             message = "'when' belongs in an effect; a condition says 'imply'"
-            raise Misplaced("E-MISPLACED", message, formula.place)
+            raise Misplaced("PDDL_MISPLACED", message, formula.place)
         case Numeric():
             message = f"the numeric condition {formula} is not handled"
-            raise Misplaced("E-UNSUPPORTED", message, formula.place)
+            raise Misplaced("PDDL_UNSUPPORTED", message, formula.place)
 
 
 def _literals(formula: Formula) -> Condition:

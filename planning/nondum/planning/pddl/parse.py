@@ -53,8 +53,8 @@ def parse_fragment(
 ) -> FragmentSyntax:
     """Parse a whole domain or problem; `file` is the name that messages give.
 
-    A byte order mark before it is passed over. Raises `FragmentRefused`: E-SYNTAX, E-UNSUPPORTED,
-    E-TWICE, PDDL_TOO_BIG, PDDL_TOO_DEEP.
+    A byte order mark before it is passed over. Raises `FragmentRefused`: PDDL_SYNTAX,
+    PDDL_UNSUPPORTED, PDDL_TWICE, PDDL_TOO_BIG, PDDL_TOO_DEEP.
     """
     return _parse_cached(text.removeprefix("\ufeff"), file, size_limit_bytes)
 
@@ -146,12 +146,12 @@ def _unexpected(error: UnexpectedInput, clean: str, text: str, file: str) -> Pro
     found = match[0] if match and not is_at_end else ""
     place = _place(clean, offset, file)
     if message := _not_handled(found, clean[max(offset - _LOOK_BACK, 0) : offset]):
-        return refusal("E-UNSUPPORTED", message, place, text)
+        return refusal("PDDL_UNSUPPORTED", message, place, text)
     expected = _expected(error)
     listed = " or ".join(expected) if len(expected) < 6 else "one of " + ", ".join(expected)
     message = f"expected {listed}, found {shown(found) if found else 'the end of the text'}"
     fix = nearest(found, (word.strip("'") for word in expected)) if len(found) > 2 else ""
-    return refusal("E-SYNTAX", message, place, text, fix=fix)
+    return refusal("PDDL_SYNTAX", message, place, text, fix=fix)
 
 
 def _not_handled(found: str, before: str) -> str:

@@ -16,7 +16,7 @@ def types_or_root(types: tuple[str, ...]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class TypeGraph:
-    """Immutable. Types that nobody gave a parent are directly under `object`."""
+    """Immutable. Types without a declared parent are directly under `object`."""
 
     parents: Mapping[str, frozenset[str]]
     _ancestors: dict[str, frozenset[str]] = field(default_factory=dict, compare=False, repr=False)

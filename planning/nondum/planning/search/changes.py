@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from nondum.planning.search.encoding import Encoded, State
 
 RULE = -1
-"""The move of a change that nobody needs to make."""
+"""The move of a change that a rule makes, without a step of the plan."""
 
 
 def bits_of(mask: int) -> Iterator[int]:

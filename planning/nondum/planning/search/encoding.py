@@ -70,7 +70,7 @@ class Encoded:
 
 
 def encode(task: GroundTask) -> Encoded:
-    """Leave out facts that are true for ever, facts that nobody asks for, and actions that cannot
+    """Leave out facts that are true for ever, facts that nothing asks for, and actions that cannot
     be reached, change nothing, or do the same as a cheaper one.
 
     The goal must be in reach when deletes are ignored.

@@ -1,7 +1,7 @@
 """Lazy greedy best-first search with preferred moves first, as in Fast Downward's LAMA.
 
 Source: Richter and Helmert 2009 (boosted preferred operators), Richter and Westphal 2010
-(landmarks). LAMA has a line of its own for landmarks; here they are added to the distance, which
+(landmarks). LAMA has a separate open list for landmarks; here they are added to the distance, which
 needed fewer estimates in most of the domains that it was tried in.
 """
 

@@ -24,9 +24,9 @@ _FIRST_TURN = 8
 """Slices of the first turn; each later one is half as long again."""
 
 _IMPROVED_MOVES = 1_000
-"""A plan of a task with so many moves is worth looking for a cheaper one, …"""
+"""In a task of up to this number of moves, a cheaper plan is worth looking for, …"""
 _IMPROVED_SLICES = 2
-"""… for so long."""
+"""… for this number of slices."""
 
 
 def solve(task: GroundTask, is_over: IsOver) -> Answer:

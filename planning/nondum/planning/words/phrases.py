@@ -43,7 +43,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Phrasebook:
-    """What people can say now. Make it with `phrasebook`, anew after each merge."""
+    """What people can say now. Make it with `phrasebook`, again after each merge."""
 
     merged: Merged
     phrases: tuple[KnownPhrase, ...]

@@ -32,7 +32,7 @@ class Step:
 def read_plan(text: str, file: str) -> tuple[Step, ...]:
     """The steps of a plan; times and durations that stand beside them are ignored.
 
-    Raises `FragmentRefused` (E-SYNTAX) with the lines that are no steps.
+    Raises `FragmentRefused` (PDDL_SYNTAX) with the lines that are no steps.
 
     >>> text = "; found\\n(GO A B)\\n0.001: (look) [1]\\n2: (LOOK) [D:1.0; C:0.5]\\n"
     >>> [step.name for step in read_plan(text, "plan")]
@@ -49,7 +49,7 @@ def read_plan(text: str, file: str) -> tuple[Step, ...]:
             steps.append(Step(_BREAK.sub(" ", found[1].lower()), place))
         else:
             message = "expected a step, such as (move a b)"
-            problems.append(refusal("E-SYNTAX", message, place, text))
+            problems.append(refusal("PDDL_SYNTAX", message, place, text))
             if len(problems) == PROBLEMS_LIMIT:
                 break
     if problems:

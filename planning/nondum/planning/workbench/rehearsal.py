@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from nondum.planning.ground.lifted import Meaning, Situation
 from nondum.planning.ground.static import Names
 from nondum.planning.merge.domain import Action, Merged, bind
 from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.caret import nearest
 from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import renamed, type_text
-from nondum.planning.workbench.lifted import Meaning, Situation
 from nondum.sdk.errors import Problem
 
 LISTED = 8
-"""So many missing conditions are named."""
+"""Missing conditions that are named, at most."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ def _parsed(text: str, file: str) -> DomainFragment | ProblemFragment:
 
 
 def _other_kind(file: str, need: str, have: str) -> FragmentRefused:
-    return FragmentRefused(Problem("E-KIND", f"expected {need}", file, need, have))
+    return FragmentRefused(Problem("PDDL_KIND", f"expected {need}", file, need, have))
 
 
 class _Loading:
@@ -100,7 +100,7 @@ class _Loading:
         named = self._problem.domain
         if named and named != self._domain.name:
             message = f"problem {self._problem.name!r} is one of domain {named!r}"
-            warning = Problem("E-DOMAIN", message, self._problem.file, have=self._domain.name)
+            warning = Problem("PDDL_DOMAIN", message, self._problem.file, have=self._domain.name)
             self._report.warnings.append(warning)
 
     def _merged(self) -> Merged:
@@ -117,7 +117,7 @@ class _Loading:
             place = next(rule.place for rule in self._domain.derived if rule.name == circle[0])
             message = f"these hold only if they do not: {', '.join(circle)}"
             fix = "take a negation out of the circle"
-            self._report.problem("E-DERIVED", message, place, fix)
+            self._report.problem("PDDL_DERIVED", message, place, fix)
         merged = Merged(
             domain=Domain(
                 types=scope.graph,
@@ -152,7 +152,7 @@ class _Loading:
         if cycle := graph.cycle():
             place = next(t.place for t in self._domain.types if t.name in cycle)
             message = f"types in a circle: {cycle_text(cycle)}"
-            self._report.problem("E-TYPE-CYCLE", message, place)
+            self._report.problem("PDDL_TYPE_CYCLE", message, place)
             return TypeGraph({name: frozenset((ROOT,)) for name in parents} | {ROOT: frozenset()})
         return graph
 
@@ -161,7 +161,7 @@ class _Loading:
         for declared in self._domain.predicates:
             if declared.name in found:
                 message = f"predicate {declared.name!r} is declared twice"
-                self._report.problem("E-TWICE", message, declared.place)
+                self._report.problem("PDDL_TWICE", message, declared.place)
             origin = self._report.origin(declared.place)
             found[declared.name] = Predicate.declared(checked(declared, self._scope), origin)
         return list(found.values())
@@ -183,14 +183,14 @@ class _Loading:
 
     def _refuse_twice(self, declared: TypedName, known: Object) -> None:
         message = f"object {declared.name!r} has another type at {known.origins[0].place}"
-        self._report.problem("E-TWICE", message, declared.place)
+        self._report.problem("PDDL_TWICE", message, declared.place)
 
     def _actions(self) -> list[Action]:
         found: dict[str, Action] = {}
         for declared in self._domain.actions:
             if declared.name in found:
                 message = f"action {declared.name!r} is declared twice"
-                self._report.problem("E-TWICE", message, declared.place)
+                self._report.problem("PDDL_TWICE", message, declared.place)
             read = read_action(declared, self._scope, unnamed_cost=0)
             if read:
                 parameters, precondition, effect = read
@@ -221,7 +221,7 @@ class _Loading:
     def _check_not_derived(self, atom: Atom, derived: set[str]) -> None:
         if atom.predicate in derived:
             message = f"{atom.predicate!r} follows from rules, and cannot be written"
-            self._report.problem("E-DERIVED", message, atom.place)
+            self._report.problem("PDDL_DERIVED", message, atom.place)
 
     def _facts(self, merged: Merged) -> frozenset[str]:
         derived = {rule.head.predicate for rule in merged.domain.derived}
@@ -232,13 +232,13 @@ class _Loading:
                 if self._scope.check_atom(formula, {}):
                     facts.add(fact(formula.predicate, *(term.name for term in formula.terms)))
             elif not isinstance(formula, Numeric):
-                self._report.problem("E-INIT", f"{formula} is not a fact", formula.place)
+                self._report.problem("PDDL_INIT", f"{formula} is not a fact", formula.place)
         return frozenset(facts)
 
     def _goal(self) -> GoalExpr:
         goal = self._problem.goal
         if goal is None:
-            problem = Problem("E-GOAL", "the problem has no goal", self._problem.file)
+            problem = Problem("PDDL_GOAL", "the problem has no goal", self._problem.file)
             self._report.problems.append(problem)
             return Condition()
         self._scope.check_formula(goal, {})

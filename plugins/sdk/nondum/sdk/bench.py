@@ -1,6 +1,6 @@
 """A plugin on the test bench: a worker in this process, and the host's side of it in plain calls.
 
-The plugin runs on a loop in a thread of its own and is reached through the same codec as in a
+The plugin runs on a loop in a separate thread and is reached through the same codec as in a
 worker process, so that what passes here passes there. Needs no Linux.
 """
 

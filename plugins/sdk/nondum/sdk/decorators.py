@@ -30,11 +30,11 @@ def behaviour(
 
     It carries out the action whose signature is `action`: `(point ?u - pointer ?h - host)`. Its
     parameters are `ctx` and then the action's, by name and in order; it gets the objects' names.
-    A coroutine function runs on the worker's loop, a plain function in a thread of its own.
+    A coroutine function runs on the worker's loop, a plain function in its own thread.
 
     Returning is SUCCESS, raising `BehaviourFailed` is FAILURE, and so is any other error; being
-    cancelled is being halted. A text that is returned is the answer to whoever asked for the goal:
-    people are told it, and it is spoken. A lasting behaviour never ends by itself and says
+    cancelled is being halted. A text that is returned is the answer to the person who gave the
+    goal: the host shows it and speaks it. A lasting behaviour never ends by itself and says
     `await ctx.established()` when its effects begin to hold.
 
     `phrase` is one pattern, or several, of words that ask for it: `"point at {t}"`.

@@ -33,7 +33,7 @@ know, so such a key is written only where an author has said something in it."""
 class Fragment:
     """A piece of PDDL, a domain or a problem, that a component contributes.
 
-    Inside it a plugin writes the local names of its own units and outputs, and `self` for the host;
+    In it the local names stand for the plugin's units and outputs, and `self` stands for the host;
     the host puts the full object names in their place.
     """
 
@@ -120,7 +120,7 @@ class Phrase:
     goal: str
     """PDDL over the slots: `(pointing self ?t)`."""
     kind: str = "achieve"
-    """`achieve`, `maintain`, or `do`: achieve it anew each time, as the answer to a question."""
+    """`achieve`, `maintain`, or `do`: achieve it again each time, as the answer to a question."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ class Problem:
     """One thing that is wrong, in the same words wherever it is shown."""
 
     code: str
-    """Stable identifier, for example `WHEEL_RECORD` or `E-PRED-ARITY`."""
+    """Stable identifier, for example `WHEEL_RECORD` or `PDDL_ARITY`."""
     message: str
     """What was found, and what was expected, in one sentence."""
     where: str = ""

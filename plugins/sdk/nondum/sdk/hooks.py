@@ -63,7 +63,7 @@ def conditions() -> Sequence[Callable[..., Any]]:  # type: ignore[empty-body]  #
 
 @hookspec
 def fragments() -> Sequence[Fragment]:  # type: ignore[empty-body]  # a specification
-    """Give the PDDL that the plugin contributes: its actions, words of its own, static facts."""
+    """Give the PDDL that the plugin contributes: actions, types, predicates, static facts."""
 
 
 @hookspec
@@ -131,7 +131,7 @@ async def learn_words(ctx: Context, vocabulary: Mapping[str, Any]) -> None:
     `vocabulary` has `phrases`, patterns with `[optional]` parts and `{slots}`; `stops`, those of
     them that stop the robot, of which none should be missed; and `names`: slot → the words that may
     be said there, without articles. The slot `addressee` is for names of hosts, which have none. A
-    slot without names takes any words. A host tells it anew each time that it changes.
+    slot without names takes any words. The host calls this again each time the vocabulary changes.
     """
 
 

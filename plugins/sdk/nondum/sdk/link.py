@@ -71,7 +71,7 @@ class Pending:
         """Settle it with an error, which need not be fetched."""
         if not self.outcome.done():
             self.outcome.set_exception(error)
-            self.outcome.exception()  # mark as seen: nobody may be waiting
+            self.outcome.exception()  # mark as seen: no task may be waiting
 
 
 class Link:
@@ -90,7 +90,7 @@ class Link:
     ) -> None:
         """Own `sock` and begin to read.
 
-        `on_request(verb, body, handles, call_id)` runs as a task of its own, owns the handles, and
+        `on_request(verb, body, handles, call_id)` runs as a separate task, owns the handles, and
         answers with its result, its `NondumError`, or HALTED when it is cancelled.
         `on_event(name, body, call_id)` is called at once. `on_closed` is called once when the other
         end is gone, and after `on_violation` when it broke the protocol; not after `close`.
@@ -191,7 +191,7 @@ class Link:
                 turn.set_result(None)
         if not self._greeting.done():
             self._greeting.set_exception(_closed())
-            self._greeting.exception()  # mark as seen: nobody may be waiting
+            self._greeting.exception()  # mark as seen: no task may be waiting
         while self._waiting:
             discard(self._waiting.popleft()[1])
 
@@ -226,7 +226,7 @@ class Link:
             message = decode(data)
             if len(handles) > (self._max_handles if isinstance(message, Request) else 0):
                 raise ProtocolViolation(
-                    Problem("PACKET_DESCRIPTORS", "a packet carries descriptors nobody asked for")
+                    Problem("PACKET_DESCRIPTORS", "a packet carries unexpected descriptors")
                 )
             self._dispatch(message, handles)
         except ProtocolViolation as violation:
@@ -255,7 +255,7 @@ class Link:
         call = self._pending.pop(call_id, None)
         if call is None:
             raise ProtocolViolation(
-                Problem("UNKNOWN_CALL", f"an answer to call {call_id}, which nobody made")
+                Problem("UNKNOWN_CALL", f"an answer to call {call_id}, which was never made")
             )
         self._free += 1
         self._next_turn()
@@ -337,7 +337,7 @@ class Link:
 
 
 def _code_of(error: Exception) -> str:
-    """Of a fault that nobody put into words; for want of a thread Python has no error class."""
+    """The code of an error that is no `NondumError`; Python has no class for a missing thread."""
     is_short = isinstance(error, MemoryError) or "can't start new thread" in str(error)
     return "NO_MEMORY" if is_short else "INTERNAL"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 STALL_S = 1.0
 """Nothing is overdue sooner."""
 PERIODS = 3
-"""What comes slowly is overdue when so many of its own periods have passed."""
+"""What comes slowly is overdue when this number of its periods have passed."""
 FIRST_S, LONGEST_FIRST_S = 5.0, 30.0
 """How long a second one is waited for at least and at most: nothing is known of the period yet but
 how long the first one took."""

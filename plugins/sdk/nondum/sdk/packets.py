@@ -111,7 +111,7 @@ class SocketPackets:
                 self._is_crowded = True
                 self._on_crowded()
                 return False
-            # EPIPE, ECONNRESET: told by the reader, on a turn of its own.
+            # EPIPE, ECONNRESET: the reader reports them, in a later turn of the loop.
             if self._loop is not None:
                 self._loop.call_soon(self._lose, None)
         return True
@@ -254,7 +254,7 @@ def adopt(handle: Handle, limit: int, on_crowded: Callable[[], None] = lambda: N
 
 
 def discard(handles: Sequence[Handle]) -> None:
-    """Close handles that nobody wants."""
+    """Close handles that are not needed."""
     for handle in handles:
         if isinstance(handle, int):
             os.close(handle)

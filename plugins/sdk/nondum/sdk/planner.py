@@ -1,7 +1,7 @@
 """The seam that planners are plugged in behind: a task in, a typed answer out.
 
 A planner is an entry point in group `nondum.planners` that loads to a class with `speaks` and
-`handles` attributes and a `plan` method. It runs in a process of its own and is killed when it
+`handles` attributes and a `plan` method. It runs in a separate process and is killed when it
 overruns.
 """
 
@@ -75,7 +75,7 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class GroundTask:
-    """A STRIPS task: positive facts only; a negated fact that matters has a twin of its own."""
+    """A STRIPS task: positive facts only; a relevant negated fact has a complementary fact."""
 
     facts: tuple[str, ...]
     """`predicate obj obj …` by index."""
@@ -161,7 +161,7 @@ class Planner(Protocol):
 
 @runtime_checkable
 class TextPlanner(Protocol):
-    """A planner of PDDL text, such as a solver that is a program of its own."""
+    """A planner of PDDL text, such as a solver that is a separate program."""
 
     speaks: ClassVar[str]
     """`pddl`."""

@@ -206,7 +206,7 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
 
 
 def _place(function: Callable[..., Any]) -> str:
-    """File and line; nothing of a class without lines of its own."""
+    """File and line of the function's code; empty where it has no Python code."""
     if isinstance(function, type) and issubclass(function, TickedBehaviour):
         function = function.initialise
     code = getattr(function, "__code__", None)

@@ -30,7 +30,7 @@ class OutputPort:
         """The stream's object name."""
         self.producer = Producer(kind)
         self.sent = 0
-        """Messages so far, whoever took them."""
+        """The number of messages so far, whether a consumer took them or not."""
         self._message_class = MESSAGES[kind]
         self._on_flow = on_flow
         self._users = 0

@@ -49,7 +49,7 @@ class Slot:
             fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, SEALS | fcntl.F_SEAL_SEAL)
         except OSError as error:
             os.close(self.descriptor)
-            raise _no_room(size, error) from error
+            raise _no_memory(size, error) from error
         except BaseException:
             os.close(self.descriptor)
             raise
@@ -61,7 +61,7 @@ class Slot:
 
 
 class SlotRing:
-    """A producer's slots. Not a queue: a frame goes to whichever slot nobody reads."""
+    """A producer's slots. Not a queue: a frame goes to any slot that has no reader."""
 
     def __init__(self) -> None:
         self._slots: dict[int, Slot] = {}
@@ -76,7 +76,7 @@ class SlotRing:
         return sum(1 for slot in self._slots.values() if slot.readers)
 
     def write(self, data: Buffer, length: int) -> Slot | None:
-        """Copy `length` bytes into a slot that nobody reads; None when all are being read.
+        """Copy `length` bytes into a slot that has no reader; None when all have readers.
 
         Raises `OSError` when the system has no memory or descriptors left.
         """
@@ -194,17 +194,17 @@ def _map_sealed(descriptor: int) -> mmap.mmap:
             raise _violation("SLOT_SIZE", f"a slot has {size} bytes")
         if allocated < size:  # the memory for the rest would be the reader's; its seals keep it so
             raise _violation("SLOT_HOLES", f"{allocated} bytes are there of a slot of {size}")
-        # Private, so that it may be mapped for writing, which ctypes asks for; nobody ever writes,
+        # Private, so that it may be mapped for writing, which ctypes asks for; no code ever writes,
         # and pages that are only read are the producer's own.
         return mmap.mmap(descriptor, size, access=mmap.ACCESS_COPY)
     except (OSError, ValueError) as error:  # no memfd at all, or not mappable
         raise _violation("SLOT_SEALS", f"a slot is no sealed memory: {error}") from error
 
 
-def _no_room(size: int, error: OSError) -> OSError:
-    """What is told where the system gives no memory for a message: how much it was, and the limit
+def _no_memory(size: int, error: OSError) -> OSError:
+    """The error of a message that the system gives no memory for: how many bytes, and the limit
     that it met, if it is that."""
-    told = f"there is no room for a message of {size} bytes ({error.strerror})"
+    told = f"there is no memory for a message of {size} bytes ({error.strerror})"
     most, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
     if error.errno == errno.EFBIG:
         told += f"; the host's [workers] file_mb lets a worker have {most} bytes in one piece"

@@ -1,6 +1,6 @@
 """One stream's way from its producer to each of its consumers on the same host.
 
-Each pair has a connection of its own; the host brokers it and is out of the data path. Frames lie
+Each pair has its own connection; the host brokers it and is out of the data path. Frames lie
 in shared slots (`nondum.sdk.slots`), small messages travel inline. A few messages are outstanding
 per consumer; while they are, the newest one waits and older ones are dropped, so that a slow,
 stopped or dead consumer costs its producer nothing. Only messages cross: no shared counters.
@@ -281,7 +281,7 @@ class Consumer:
             self._accept(unpack(data, self._limit), unclaimed)
             if unclaimed:
                 raise ProtocolViolation(
-                    Problem("PACKET_DESCRIPTORS", "a packet carries descriptors nobody asked for")
+                    Problem("PACKET_DESCRIPTORS", "a packet carries unexpected descriptors")
                 )
         except ProtocolViolation as violation:
             self._lose(violation)
@@ -309,7 +309,7 @@ class Consumer:
         self._on_message()
 
     def _give_back(self, seq: int) -> None:
-        """Release a frame that nobody looks at any more, from whichever thread."""
+        """Release a frame that no reader uses any more, from whichever thread."""
         if threading.get_ident() == self._thread:
             self._release(seq)
         else:

@@ -1,4 +1,4 @@
-"""Plain functions as behaviours: a thread of their own, and a context whose calls wait."""
+"""Plain functions as behaviours: each has its own thread, and a context whose calls wait."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ async def run_in_thread(
             outcome = (None, error)
         except BaseException as error:  # SystemExit would end the whole worker
             outcome = (None, RuntimeError(f"{type(error).__name__}: {error}"))
-        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+        with contextlib.suppress(RuntimeError):  # the loop is closed: no task waits any more
             loop.call_soon_threadsafe(settle, *outcome)
 
     threading.Thread(target=run, name=getattr(function, "__name__", "call"), daemon=True).start()

@@ -120,7 +120,7 @@ def _wrapped(libusb1: Any, descriptor: int) -> Iterator[Any]:
             return self.handle
 
         def close_device(self, dev_handle: Any) -> None:
-            """Whoever opened it closes it."""
+            """Leave it open: the code that opened it closes it."""
 
     backend = OneDevice(libusb1.get_backend())
     wrapped = ctypes.c_void_p()

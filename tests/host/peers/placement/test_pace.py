@@ -10,7 +10,7 @@ from nondum.host.peers.placement.pace import LARGEST, LEAST, MOST, PIECES, WAIT_
 
 
 def transfer(rate: float, round_trip_s: float, rounds: int = 400) -> tuple[Pace, list[float]]:
-    """A transfer over a link of so many bytes a second; how long each piece has waited in it."""
+    """A transfer over a link of `rate` bytes a second; how long each piece has waited in it."""
     pace, waited, free_s, now_s = Pace(), [], 0.0, 0.0
     under_way: list[tuple[float, int, float]] = []
     for _ in range(rounds):
@@ -32,7 +32,7 @@ def test_fast_link_is_filled() -> None:
 
 @pytest.mark.parametrize("rate", [60e3, 125e3, 1e6])
 @pytest.mark.parametrize("round_trip_s", [0.002, 0.2])
-def test_others_wait_little_on_a_slow_link(rate: float, round_trip_s: float) -> None:
+def test_other_traffic_waits_little_on_a_slow_link(rate: float, round_trip_s: float) -> None:
     _, waited = transfer(rate, round_trip_s)
     at_least_s = LEAST / rate
     assert max(waited[50:]) <= 3 * max(WAIT_S, at_least_s)

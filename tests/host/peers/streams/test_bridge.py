@@ -161,11 +161,11 @@ async def test_one_copy_crosses_for_three_readers() -> None:
     assert forwarded < (frames + 3) * NOISE.nbytes * 1.1
 
 
-async def test_stopped_reader_costs_the_others_nothing() -> None:
+async def test_stopped_reader_costs_other_readers_nothing() -> None:
     async with pair() as hosts:
         producer, grant, _ = await hosts.export("image")
         number = await hosts.reader.import_("image", HERE, grant, Over())
-        ours, theirs = link_sockets()  # nobody ever reads from it
+        ours, theirs = link_sockets()  # no process ever reads from it
         with ours, theirs:
             await hosts.reader.feed(number, "stopped", theirs)
             reader = await hosts.reading(number, "image", "awake")
@@ -343,7 +343,7 @@ async def test_first_address_that_works_is_taken() -> None:
             await reader.until()
 
 
-async def test_nobody_at_the_address_is_told() -> None:
+async def test_address_without_a_listener_is_told() -> None:
     async with pair() as hosts:
         _, grant, _ = await hosts.export("image")
         with pytest.raises(WorkerFailed, match="STREAM_"):

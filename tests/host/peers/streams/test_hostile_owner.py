@@ -40,7 +40,7 @@ def png() -> bytes:
 
 
 class Owner:
-    """An exporter in this process, that sends what it likes to a bridge of its own process."""
+    """An exporter in this process, that sends what it likes to a bridge in another process."""
 
     def __init__(self) -> None:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -76,7 +76,7 @@ async def both() -> AsyncIterator[tuple[Owner, Bridge]]:
 
 
 async def arrives(owner: Owner, bridge: Bridge) -> None:
-    """A good image, over a stream of its own."""
+    """A good image arrives, over a separate stream."""
     outgoing, number, _ = await owner.opened(bridge)
     reader = Reader("image")
     await reader.attach(bridge, number, "eye")
@@ -132,7 +132,7 @@ async def test_bad_frame_ends_its_stream_only(kind: str, frame: Frame) -> None:
 class Obedient:
     """What an owner's window is where it keeps none."""
 
-    has_room = True
+    can_send = True
 
     def sent(self, seq: int, length: int, now_s: float) -> None: ...
 

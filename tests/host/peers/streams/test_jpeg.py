@@ -20,7 +20,7 @@ def picture(width: int = 6, height: int = 4, mode: str = "RGB", form: str = "JPE
     return out.getvalue()
 
 
-def test_sound_picture_has_the_bytes_that_its_header_promises() -> None:
+def test_sound_picture_has_the_bytes_that_its_header_declares() -> None:
     assert jpeg.restored(HEADER, picture()) == bytes(6 * 4 * 3)
     assert jpeg.restored({**HEADER, "encoding": "mono8"}, picture(mode="L")) == bytes(6 * 4)
 

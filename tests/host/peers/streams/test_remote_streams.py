@@ -146,7 +146,7 @@ async def test_last_reader_closes_the_stream_and_the_bridges_end(fleet: Fleet) -
     assert status.is_flowing, "reading it from afar changed nothing"
 
 
-async def test_one_reader_less_leaves_the_others(fleet: Fleet) -> None:
+async def test_one_reader_less_leaves_the_other_readers(fleet: Fleet) -> None:
     await fleet.camera()
     call = await fleet.watcher("one")
     await fleet.watcher("two")
@@ -248,7 +248,7 @@ async def test_peer_may_open_only_so_many(fleet: Fleet) -> None:
     assert (await fleet.rover_bridge.figures())["exports"] == {}
 
 
-async def test_nobody_closes_what_another_has_opened(fleet: Fleet) -> None:
+async def test_no_peer_closes_a_stream_that_another_has_opened(fleet: Fleet) -> None:
     await fleet.camera()
     opened = await fleet.shared.serve_open(BASE, {"stream": FRAMES, "bridge": "0" * 40})
     await fleet.shared.serve_close(PeerKey("another"), {"token": opened["token"]})

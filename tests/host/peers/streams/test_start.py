@@ -111,7 +111,7 @@ async def test_what_a_bridge_prints_goes_where_its_errors_go() -> None:
         assert (held / "1").readlink() == (held / "2").readlink()
 
 
-async def test_bridge_dies_with_its_fork_server_and_starts_anew() -> None:
+async def test_bridge_dies_with_its_fork_server_and_starts_again() -> None:
     async with forks() as client, bridge_of(client) as bridge:
         async with bridge.kept() as former:
             assert client.pid is not None

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from tests.kit.processes import until_gone
 
-from nondum.host.core.feedback_state import NOTHING, Concern, State
+from nondum.host.core.feedback_state import NOTHING, State, StateReason
 from nondum.host.people.feedback import program
 from nondum.host.people.feedback.hook import Hook
 from nondum.host.people.feedback.outputs import Outlet
@@ -24,7 +24,7 @@ from nondum.sdk.errors import InstallFailed
 
 pytestmark = pytest.mark.anyio
 
-REFUSED = Concern(
+REFUSED = StateReason(
     State.REFUSED, "payload k", "it is not\nsigned; $(id)", "SIG_MISSING", "org.example.eye"
 )
 FOR_EVER_S = 600.0
@@ -105,7 +105,7 @@ async def test_a_hook_runs_once_at_a_time_and_the_newest_state_wins(tmp_path: Pa
     outlet.show(REFUSED)
     await asyncio.to_thread(begun.read_text)
     for state in (State.WORKING, State.SAFE, State.READY):
-        outlet.show(Concern(state, "drive a", "told"))
+        outlet.show(StateReason(state, "drive a", "told"))
     await asyncio.to_thread(go.write_text, "on\n")
     await asyncio.to_thread(begun.read_text)
     running.cancel()
@@ -119,7 +119,7 @@ class Faulty:
     def __init__(self) -> None:
         self.fails = True
 
-    async def show(self, concern: Concern) -> None:
+    async def show(self, reason: StateReason) -> None:
         if self.fails:
             raise ZeroDivisionError
 
@@ -149,7 +149,7 @@ async def test_a_player_hears_a_tune_once_for_each_state(tmp_path: Path) -> None
     heard = tmp_path / "heard"
     player = Player([script(tmp_path, f"cat >> {heard}")])
     await player.show(REFUSED)
-    await player.show(Concern(State.REFUSED, "drive b", "another"))
+    await player.show(StateReason(State.REFUSED, "drive b", "another"))
     assert heard.read_bytes() == wav(TUNES[State.REFUSED])
 
 
@@ -171,22 +171,22 @@ async def test_no_two_tunes_are_alike() -> None:
     assert len(set(map(tuple, TUNES.values()))) == len(State)
 
 
-SAFE = Concern(State.SAFE, "drive a", "drive a may be pulled", drive="a")
+SAFE = StateReason(State.SAFE, "drive a", "drive a may be pulled", drive="a")
 
 
 @pytest.mark.parametrize(
-    ("concern", "aloud", "said"),
+    ("reason", "aloud", "said"),
     [
         (SAFE, [], "drive a may be pulled"),
         (REFUSED, [], REFUSED.sentence),
         (REFUSED, ["org.example.eye is refused: SIG_MISSING it is not signed"], None),
-        (REFUSED, ["org.example.ear is refused: SIG_MISSING it is not signed"], REFUSED.sentence),
+        (REFUSED, ["org.example.arm is refused: SIG_MISSING it is not signed"], REFUSED.sentence),
         (NOTHING, [], None),
-        (Concern(State.WORKING, "drive a", "drive a is being read", drive="a"), [], None),
+        (StateReason(State.WORKING, "drive a", "drive a is being read", drive="a"), [], None),
     ],
     ids=["safe", "refused", "told already", "told of another", "ready", "working"],
 )
-async def test_only_what_nobody_else_says_is_said(
-    concern: Concern, aloud: list[str], said: str | None
+async def test_only_what_no_announcement_says_is_said(
+    reason: StateReason, aloud: list[str], said: str | None
 ) -> None:
-    assert spoken(concern, aloud, 160) == said
+    assert spoken(reason, aloud, 160) == said

@@ -1,4 +1,4 @@
-"""Of all concerns, the one that is shown, and how long."""
+"""Of all state reasons, the one that is shown, and how long."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from itertools import permutations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.core.feedback_state import NOTHING, Concern, State
+from nondum.host.core.feedback_state import NOTHING, State, StateReason
 from nondum.host.people.feedback.showing import Durations, Shown, shown, since
 
 DURATIONS = Durations(refused_s=60, safe_s=15)
-REFUSED = Concern(State.REFUSED, "payload k", "refused", "SIG_MISSING")
-WORKING = Concern(State.WORKING, "drive a", "working")
-SAFE = Concern(State.SAFE, "drive a", "safe")
-HELP = Concern(State.HELP, "goal 1", "help")
-CONCERNS = st.lists(
+REFUSED = StateReason(State.REFUSED, "payload k", "refused", "SIG_MISSING")
+WORKING = StateReason(State.WORKING, "drive a", "working")
+SAFE = StateReason(State.SAFE, "drive a", "safe")
+HELP = StateReason(State.HELP, "goal 1", "help")
+REASONS = st.lists(
     st.builds(
-        Concern,
+        StateReason,
         st.sampled_from([s for s in State if s is not State.READY]),
         st.sampled_from(["drive a", "drive b", "goal 1"]),
         st.just("told"),
@@ -28,19 +28,19 @@ CONCERNS = st.lists(
 )
 
 
-def at_once(*concerns: Concern) -> Shown:
-    return shown(concerns, since({}, concerns, 0.0), 0.0, DURATIONS)
+def at_once(*reasons: StateReason) -> Shown:
+    return shown(reasons, since({}, reasons, 0.0), 0.0, DURATIONS)
 
 
 def test_nothing_to_tell_is_ready() -> None:
     assert at_once() == Shown(NOTHING, None)
 
 
-def test_the_order_of_concerns_does_not_matter() -> None:
+def test_the_order_of_state_reasons_does_not_matter() -> None:
     every = (REFUSED, WORKING, SAFE, HELP)
-    assert {at_once(*order).concern for order in permutations(every)} == {REFUSED}
-    assert {at_once(*order).concern for order in permutations(every[1:])} == {WORKING}
-    assert {at_once(*order).concern for order in permutations(every[2:])} == {HELP}
+    assert {at_once(*order).reason for order in permutations(every)} == {REFUSED}
+    assert {at_once(*order).reason for order in permutations(every[1:])} == {WORKING}
+    assert {at_once(*order).reason for order in permutations(every[2:])} == {HELP}
 
 
 def test_a_drive_that_may_be_pulled_does_not_hide_that_help_is_needed() -> None:
@@ -48,8 +48,8 @@ def test_a_drive_that_may_be_pulled_does_not_hide_that_help_is_needed() -> None:
     assert shown([SAFE, HELP], known, 6.0, DURATIONS) == Shown(HELP, None)
     known = since(since({}, [HELP], 0.0), [SAFE, HELP], 5.0)
     both = shown([SAFE, HELP], known, 6.0, DURATIONS)
-    assert (both.concern.state, both.until_s) == (State.SAFE, 20.0)
-    assert HELP.sentence in both.concern.sentence
+    assert (both.reason.state, both.until_s) == (State.SAFE, 20.0)
+    assert HELP.sentence in both.reason.sentence
     assert shown([SAFE, HELP], known, 20.0, DURATIONS) == Shown(HELP, None)
 
 
@@ -59,9 +59,9 @@ def test_a_refusal_is_shown_for_its_time_then_what_is_behind_it() -> None:
     assert shown([REFUSED, HELP], known, 160.0, DURATIONS) == Shown(HELP, None)
 
 
-def test_a_refusal_whose_drive_is_pulled_is_not_shown_any_more() -> None:
+def test_a_refusal_is_not_shown_once_its_drive_is_pulled() -> None:
     known = since(since({}, [REFUSED], 0.0), [], 1.0)
-    assert shown([], known, 1.0, DURATIONS).concern == NOTHING
+    assert shown([], known, 1.0, DURATIONS).reason == NOTHING
 
 
 def test_what_comes_again_is_news_again() -> None:
@@ -72,28 +72,28 @@ def test_what_comes_again_is_news_again() -> None:
 
 
 def test_of_two_refusals_the_newer_is_shown() -> None:
-    later = Concern(State.REFUSED, "drive b", "no payload", "DRIVE_NOT_PAYLOAD")
+    later = StateReason(State.REFUSED, "drive b", "no payload", "DRIVE_NOT_PAYLOAD")
     known = since(since({}, [REFUSED], 0.0), [REFUSED, later], 5.0)
-    assert shown([REFUSED, later], known, 6.0, DURATIONS).concern == later
+    assert shown([REFUSED, later], known, 6.0, DURATIONS).reason == later
 
 
-@given(CONCERNS, st.floats(0, 1e6), st.floats(0, 1e3))
-def test_what_is_shown_is_a_concern_and_changes_when_it_says(
-    concerns: list[Concern], began_s: float, later_s: float
+@given(REASONS, st.floats(0, 1e6), st.floats(0, 1e3))
+def test_what_is_shown_is_a_state_reason_and_changes_when_it_says(
+    reasons: list[StateReason], began_s: float, later_s: float
 ) -> None:
-    known = since({}, concerns, began_s)
-    now = shown(concerns, known, began_s + later_s, DURATIONS)
-    assert replace(now.concern, sentence="") in [
-        replace(concern, sentence="") for concern in (*concerns, NOTHING)
+    known = since({}, reasons, began_s)
+    now = shown(reasons, known, began_s + later_s, DURATIONS)
+    assert replace(now.reason, sentence="") in [
+        replace(reason, sentence="") for reason in (*reasons, NOTHING)
     ]
     assert now.until_s is None or now.until_s > began_s + later_s
     if now.until_s is not None:  # then it gives way to another
-        assert shown(concerns, known, now.until_s, DURATIONS).concern != now.concern
+        assert shown(reasons, known, now.until_s, DURATIONS).reason != now.reason
 
 
-@given(CONCERNS)
-def test_nothing_is_shown_while_something_before_it_is_new(concerns: list[Concern]) -> None:
+@given(REASONS)
+def test_nothing_is_shown_while_something_before_it_is_new(reasons: list[StateReason]) -> None:
     order = (State.REFUSED, State.WORKING, State.HELP, State.SAFE, State.READY)
-    ranks = [order.index(concern.state) for concern in concerns]
-    now = at_once(*concerns).concern
+    ranks = [order.index(reason.state) for reason in reasons]
+    now = at_once(*reasons).reason
     assert order.index(now.state) == min(ranks, default=order.index(State.READY))

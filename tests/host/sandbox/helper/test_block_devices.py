@@ -53,7 +53,7 @@ class Computer:
         (self.root / "dev").mkdir(exist_ok=True)
         os.mknod(self.root / "dev" / name, stat.S_IFBLK | 0o600, os.makedev(*number))
 
-    def whose(self) -> dict[str, str]:
+    def owners(self) -> dict[str, str]:
         return {disk.name: disk.owner.value for disk in disks(self.machine, OURS)}
 
 
@@ -68,16 +68,16 @@ def computer(tmp_path: Path) -> Computer:
     return computer
 
 
-def test_disk_that_nobody_needs_has_drives_for_partitions(computer: Computer) -> None:
+def test_unused_disk_has_drives_for_partitions(computer: Computer) -> None:
     assert computer.machine.uses(OURS).keys() == {"sda"}
     owners = {"sda": "host", "sdb": "", "sdb1": "drive", "sdb2": "drive"}
-    assert computer.whose() == owners
+    assert computer.owners() == owners
 
 
 def test_usb_disk_that_the_machine_boots_from_is_its_own(computer: Computer) -> None:
     """Its root may be hidden beneath another file system: the kernel's command line tells."""
     computer.write("proc/cmdline", "root=/dev/sdb2 ro\n")
-    assert computer.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
+    assert computer.owners() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 
 def test_file_system_of_several_devices_is_known_by_what_was_mounted(computer: Computer) -> None:
@@ -89,10 +89,10 @@ def test_file_system_of_several_devices_is_known_by_what_was_mounted(computer: C
 
 def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(computer: Computer) -> None:
     computer.write("proc/self/mountinfo", "23 22 8:17 / /media/ann/X rw - vfat /dev/sdb1 rw\n")
-    assert computer.whose()["sdb1"] == Owner.SOMEBODY.value
-    assert computer.whose()["sdb2"] == Owner.DRIVE.value
+    assert computer.owners()["sdb1"] == Owner.SOMEBODY.value
+    assert computer.owners()["sdb2"] == Owner.DRIVE.value
     computer.write("etc/fstab", "/dev/sdb1 /media/ann/X vfat noauto,user\n")
-    assert computer.whose()["sdb1"] == computer.whose()["sdb2"] == Owner.HOST.value
+    assert computer.owners()["sdb1"] == computer.owners()["sdb2"] == Owner.HOST.value
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_named_by_a_unit_is_the_machine_s_own_mounted_or_not(
     computer.write(f"{folder}/{file}", text)
     unit = file.partition(".d/")[0]
     assert computer.machine.uses(OURS)["sdb1"].why == f"the machine {why} ({unit})"
-    assert computer.whose() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
+    assert computer.owners() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 
 def test_units_that_mount_nothing_of_a_disk_or_are_masked_say_nothing(computer: Computer) -> None:
@@ -118,12 +118,12 @@ def test_units_that_mount_nothing_of_a_disk_or_are_masked_say_nothing(computer: 
     computer.write("vendor/disk.service", "[Mount]\nWhat=/dev/sdb1\n")
     computer.write("vendor/old.mount", "[Mount]\n#What=/dev/sdb1\nWhere=/dev/sdb1\n")
     (computer.root / "vendor/gone.mount").symlink_to("/dev/null")
-    assert computer.whose()["sdb1"] == Owner.DRIVE.value
+    assert computer.owners()["sdb1"] == Owner.DRIVE.value
 
 
 def test_mounted_by_this_host_to_be_read_is_still_a_drive(computer: Computer) -> None:
     computer.write("proc/self/mountinfo", f"23 22 8:17 / {OURS}/sdb1-7 ro - vfat /dev/sdb1 ro\n")
-    assert computer.whose()["sdb1"] == Owner.DRIVE.value
+    assert computer.owners()["sdb1"] == Owner.DRIVE.value
 
 
 def test_decrypted_and_swapped_to_are_the_machine_s_own(computer: Computer) -> None:

@@ -13,7 +13,7 @@ from nondum.host.sandbox.helper.device_nodes import Nodes
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
-NOBODY = 65534
+SERVED = 65534
 INTERFACE = "devices/pci0000:00/usb1/1-2/1-2:1.0"
 
 
@@ -32,7 +32,7 @@ def plug(sys: Path, place: str, number: str, subsystem: str, *, interface: str =
 
 
 def nodes(tmp_path: Path, *subsystems: str) -> Nodes:
-    return Nodes(tmp_path / "run", NOBODY, frozenset(subsystems), tmp_path / "sys")
+    return Nodes(tmp_path / "run", SERVED, frozenset(subsystems), tmp_path / "sys")
 
 
 def refused(nodes: Nodes, number: tuple[int, int]) -> str:
@@ -50,7 +50,7 @@ def test_node_is_made_for_its_user_alone_and_removed(tmp_path: Path) -> None:
     found = node.lstat()
     assert stat.S_ISCHR(found.st_mode)
     assert (os.major(found.st_rdev), os.minor(found.st_rdev)) == (188, 0)
-    assert (stat.S_IMODE(found.st_mode), found.st_uid) == (0o600, NOBODY)
+    assert (stat.S_IMODE(found.st_mode), found.st_uid) == (0o600, SERVED)
     assert node == made.put("eye", "line", 188, 0)
     made.take("eye", "line")
     made.take("eye", "line")
@@ -208,7 +208,7 @@ def test_folder_that_another_process_removes_meanwhile_is_passed_over(tmp_path: 
     assert not made.are_there
 
 
-def test_node_goes_of_whose_device_nothing_can_be_told_any_more(tmp_path: Path) -> None:
+def test_node_goes_once_nothing_is_known_of_its_device(tmp_path: Path) -> None:
     sys = tmp_path / "sys"
     plug(sys, f"{INTERFACE}/0003:1/hidraw/hidraw0", "240:0", "hidraw", interface="03 00")
     made = nodes(tmp_path)

@@ -79,7 +79,9 @@ def test_at_the_end_it_shows_what_it_showed_before(leds: Path, tmp_path: Path) -
     assert not lamps.kept.exists()
 
 
-def test_whoever_comes_after_one_that_was_killed_knows_it_too(leds: Path, tmp_path: Path) -> None:
+def test_next_daemon_after_a_killed_one_knows_what_the_lamp_showed(
+    leds: Path, tmp_path: Path
+) -> None:
     lamp(leds, "PWR", "[none] timer heartbeat", brightness="7")
     chosen(tmp_path, "PWR").show(State.WORKING)
     kernel(leds, "PWR")
@@ -88,7 +90,7 @@ def test_whoever_comes_after_one_that_was_killed_knows_it_too(leds: Path, tmp_pa
     assert (said(leds, "PWR")["trigger"], said(leds, "PWR")["brightness"]) == ("none", "7")
 
 
-def test_a_lamp_that_is_not_there_is_told_and_the_others_lit(leds: Path, tmp_path: Path) -> None:
+def test_a_missing_lamp_is_told_and_the_rest_is_lit(leds: Path, tmp_path: Path) -> None:
     with pytest.raises(InstallFailed) as refused:
         chosen(tmp_path, "no-such", "ACT").show(State.READY)
     assert [problem.code for problem in refused.value.problems] == ["LAMP_MISSING"]

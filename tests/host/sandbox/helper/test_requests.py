@@ -1,4 +1,4 @@
-"""What the helper understands, and that nothing else gets past its door."""
+"""What the helper's parser of requests accepts, and that it refuses all else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The helper as a process of root, asked by a user: the one whom it serves, and hostile ones."""
+"""The helper as a process of root, asked by the user that it serves and by hostile ones."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Helper:
         return HelperClient(self.socket)
 
     def is_well(self) -> bool:
-        """Whether it still answers the one whom it serves."""
+        """Whether it still answers the user that it serves."""
         return isinstance(served(lambda: self.client.ask(requests.ListCgroups())), dict)
 
 
@@ -182,7 +182,7 @@ def test_descriptors_are_refused_and_not_kept(helper: Helper) -> None:
     os.close(read)
 
 
-def test_who_connects_and_says_nothing_keeps_nobody_out(helper: Helper) -> None:
+def test_silent_connections_keep_no_client_out(helper: Helper) -> None:
     idle = []
     for _ in range(MOST_CHILDREN // 2):
         silent = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -373,7 +373,7 @@ def test_cgroups_hold_processes_of_the_served_user_only(helper: Helper) -> None:
     somebody.wait()
 
 
-def test_helper_ends_when_nobody_asks(tmp_path: Path) -> None:
+def test_helper_ends_when_no_request_comes(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
         listening.bind(str(tmp_path / "s"))
         listening.listen()
@@ -451,7 +451,7 @@ def test_nodes_go_when_the_kernel_tells_that_their_device_has_gone(tmp_path: Pat
         server = threading.Thread(target=Server(listening, service, ending, told, 0.05).run)
         server.start()
         kernel.send(REMOVED)
-        server.join()  # once there is no node, it ends when nobody asks
+        server.join()  # once there is no node, it ends when no request comes
     assert not mine.exists()
 
 

@@ -1,4 +1,4 @@
-"""What root's end refuses, whoever got past its door."""
+"""What the helper's service, which runs as root, refuses even if its parser accepted it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="making device nodes needs root")
-NOBODY = 65534
+SERVED = 65534
 STICK = requests.Mount("sdb1", 7, "ext4", "read")
 
 
@@ -30,9 +30,9 @@ def stick(tmp_path: Path) -> Machine:
 
 @pytest.fixture
 def root(stick: Machine, tmp_path: Path) -> Service:
-    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+    nodes = Nodes(tmp_path / "nodes", SERVED, sys=tmp_path / "sys")
     lamps = Lamps((), tmp_path / "lamps.json")
-    return Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps, no_key)
+    return Service(SERVED, tmp_path / "mounts", stick.disks, nodes, NoTree(), lambda: lamps, no_key)
 
 
 def no_key() -> PressesOfDevice:
@@ -45,12 +45,12 @@ def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
     for name, text in (("trigger", "[mmc0] none"), ("brightness", "0"), ("max_brightness", "9")):
         (lamp / name).write_text(text)
     names: list[str] = []
-    nodes = Nodes(tmp_path / "nodes", NOBODY, sys=tmp_path / "sys")
+    nodes = Nodes(tmp_path / "nodes", SERVED, sys=tmp_path / "sys")
 
     def lamps() -> Lamps:
         return Lamps(tuple(names), tmp_path / "run/lamps.json", tmp_path / "leds")
 
-    root = Service(NOBODY, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps, no_key)
+    root = Service(SERVED, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps, no_key)
     root.serve(requests.ShowLamps("ready"))
     assert (lamp / "brightness").read_text() == "0"
     names.append("ACT")
@@ -67,7 +67,7 @@ def refused(root: Service, request: Request) -> str:
     return error.value.problems[0].message
 
 
-def test_nodes_of_nobody_are_not_made(root: Service) -> None:
+def test_nodes_without_a_component_are_not_made(root: Service) -> None:
     assert refused(root, requests.PutNode("", "line", 188, 0, None)) == "a node is some component's"
 
 
@@ -86,7 +86,7 @@ def test_so_many_drives_are_mounted_and_no_more(root: Service) -> None:
 def test_only_a_limited_number_of_cgroups_is_made(
     root: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(service, "MOST_CAGES", 0)
+    monkeypatch.setattr(service, "MOST_CGROUPS", 0)
     assert refused(root, requests.MakeCgroup("a.1")) == "there are 0 cgroups already"
 
 
@@ -95,9 +95,9 @@ def test_processes_of_the_system_are_put_into_no_cgroup(root: Service, pid: int)
     assert refused(root, requests.FillCgroup("a.1", pid)) == "that is no process of yours"
 
 
-def test_processes_of_others_are_put_into_no_cgroup(root: Service) -> None:
-    somebody = subprocess.Popen(["sleep", "60"], user=NOBODY - 1)
-    served = subprocess.Popen(["sleep", "60"], user=NOBODY)
+def test_processes_of_other_users_are_put_into_no_cgroup(root: Service) -> None:
+    somebody = subprocess.Popen(["sleep", "60"], user=SERVED - 1)
+    served = subprocess.Popen(["sleep", "60"], user=SERVED)
     try:
         assert "no process of yours" in refused(root, requests.FillCgroup("a.1", somebody.pid))
         root.serve(requests.FillCgroup("a.1", served.pid))

@@ -1,4 +1,4 @@
-"""Rooms and scratch folders get users of workers: which ones, of whom, and nothing else."""
+"""Sandboxes and scratch folders of the served user get users of workers, and nothing else does."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def refused(ask: Callable[[], object]) -> str:
     return error.value.problems[0].message
 
 
-def test_room_of_the_one_who_is_served_knows_them_and_the_users_of_workers(root: Service) -> None:
+def test_namespace_of_the_served_user_maps_it_and_the_users_of_workers(root: Service) -> None:
     with process_of(SERVED.pw_uid) as pid:
         root.serve(requests.MapUsers(pid))
         same = [OF_SERVICE.start, OF_SERVICE.start, len(OF_SERVICE)]
@@ -107,14 +107,14 @@ def test_room_of_the_one_who_is_served_knows_them_and_the_users_of_workers(root:
 
 
 @pytest.mark.parametrize("user", [0, STRANGER.pw_uid])
-def test_rooms_of_others_are_left_alone(root: Service, user: int) -> None:
+def test_namespaces_of_other_users_are_left_alone(root: Service, user: int) -> None:
     with process_of(user) as pid:
         assert "no process of yours" in refused(lambda: root.serve(requests.MapUsers(pid)))
         assert map_of(pid, "uid_map") == []
 
 
 @pytest.mark.parametrize("pid", [0, 1])
-def test_processes_of_the_system_s_own_have_no_rooms(root: Service, pid: int) -> None:
+def test_users_are_not_mapped_for_processes_of_the_system(root: Service, pid: int) -> None:
     assert refused(lambda: root.serve(requests.MapUsers(pid))) == "that is no process of yours"
 
 
@@ -171,7 +171,7 @@ def test_users_that_are_no_workers_are_not_given(root: Service, folder: Path, us
     assert "no user of workers" in refused(lambda: root.serve(node))
 
 
-def test_folders_of_others_are_not_mapped(root: Service, folder: Path) -> None:
+def test_folders_of_other_users_are_not_mapped(root: Service, folder: Path) -> None:
     os.chown(folder, STRANGER.pw_uid, STRANGER.pw_gid)
     assert refused(lambda: mapped(root, folder)) == "that is no folder of yours"
 
@@ -273,7 +273,7 @@ def test_folder_that_comes_with_another_descriptor_is_not_mapped(
     os.close(mount)
 
 
-def test_node_is_the_workers_whose_it_is_to_be(tmp_path: Path) -> None:
+def test_node_belongs_to_the_user_of_the_worker_that_it_is_for(tmp_path: Path) -> None:
     hidraw, sys = "devices/usb1/1-2/1-2:1.0/hidraw/hidraw0", tmp_path / "sys"
     (sys / hidraw).mkdir(parents=True)
     (sys / "dev/char").mkdir(parents=True)

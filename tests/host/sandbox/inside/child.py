@@ -1,4 +1,4 @@
-"""A process of its own that gives up what a test says, and tells what it still has."""
+"""A separate process that gives up what a test says, and tells what it still has."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An interpreter that waits to become a worker, without a room around it."""
+"""An interpreter that waits to become a worker, without a sandbox around it."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_process_ends_with_the_one_that_started_it() -> None:
     assert number == signal.SIGKILL
 
 
-def test_process_whose_starter_has_ended_ends_at_once() -> None:
+def test_process_ends_at_once_where_its_starter_has_ended() -> None:
     assert (
         told(
             "try:\n"

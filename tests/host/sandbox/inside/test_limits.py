@@ -52,5 +52,5 @@ def test_tighter_limit_of_the_system_stays() -> None:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to be another user")
 def test_tasks_are_counted_from_those_that_its_user_has_already() -> None:
-    before = "os.setresuid(61500, 61500, 61500)"  # of nobody
+    before = "os.setresuid(61500, 61500, 61500)"  # a user that no other process has
     assert limited("RLIMIT_NPROC", {**GIVEN, "tasks": 20}, before) == [21, 21]

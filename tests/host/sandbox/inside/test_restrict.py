@@ -25,16 +25,16 @@ NOTHING: dict[str, Any] = {
 }
 
 
-def put_up(**walls: Any) -> Mapping[str, str]:
-    """The status of a process behind these (proc_pid_status(5))."""
-    program = "os.setgroups([4, 5])\nwalls.put_up(given, None)\ntell(status())"
-    found: Mapping[str, str] = told(program, {**NOTHING, **walls})
+def restricted(**restrictions: Any) -> Mapping[str, str]:
+    """The status of a process with these restrictions (proc_pid_status(5))."""
+    program = "os.setgroups([4, 5])\nrestrict.restrict(given, None)\ntell(status())"
+    found: Mapping[str, str] = told(program, {**NOTHING, **restrictions})
     return found
 
 
 @needs_root
 def test_nothing_is_given_up_unless_it_is_said() -> None:
-    found = put_up()
+    found = restricted()
     assert found["Uid"].split() == ["0"] * 4
     assert found["Groups"].split() == ["4", "5"]
     assert int(found["CapEff"], 16)
@@ -42,8 +42,8 @@ def test_nothing_is_given_up_unless_it_is_said() -> None:
 
 
 @needs_root
-def test_user_and_all_groups_are_others() -> None:
-    found = put_up(user=USER, groups=[GROUP])
+def test_user_and_all_groups_are_changed() -> None:
+    found = restricted(user=USER, groups=[GROUP])
     assert found["Uid"].split() == [str(USER)] * 4
     assert found["Gid"].split() == [str(USER)] * 4
     assert found["Groups"].split() == [str(GROUP)]
@@ -51,20 +51,20 @@ def test_user_and_all_groups_are_others() -> None:
 
 @needs_root
 def test_root_holds_no_capabilities() -> None:
-    found = put_up(keeps_capabilities=False)
+    found = restricted(keeps_capabilities=False)
     assert not any(int(found[each], 16) for each in ("CapInh", "CapPrm", "CapEff", "CapBnd"))
 
 
 @needs_root
 def test_no_privileges_are_gained() -> None:
-    assert put_up(may_gain_privileges=False)["NoNewPrivs"] == "1"
+    assert restricted(may_gain_privileges=False)["NoNewPrivs"] == "1"
 
 
 @needs_root
 @needs_filters
 def test_calls_are_filtered() -> None:
     program = refusals.filter_of(refusals.AT_LEAST, refusals.machine(), without=())
-    assert put_up(filter=base64.b64encode(program).decode())["Seccomp"] == "2"
+    assert restricted(filter=base64.b64encode(program).decode())["Seccomp"] == "2"
 
 
 def test_ruleset_is_taken_on_and_let_go(tmp_path: Path) -> None:
@@ -73,8 +73,8 @@ def test_ruleset_is_taken_on_and_let_go(tmp_path: Path) -> None:
         "from nondum.host.sandbox.levels import landlock\n"
         "with landlock.ruleset(readable=(), writable=()) as ruleset:\n"
         "    mine = os.dup(ruleset)\n"
-        "    restrict.put_up({**given['walls'], 'may_gain_privileges': False}, mine)\n"
+        "    restrict.restrict({**given['nothing'], 'may_gain_privileges': False}, mine)\n"
         "tell([failure(lambda: os.fstat(mine)), failure(lambda: open(given['file']))])",
-        {"walls": NOTHING, "file": str(tmp_path / "secret")},
+        {"nothing": NOTHING, "file": str(tmp_path / "secret")},
     )
     assert told_of == ["EBADF", "EACCES"]

@@ -1,4 +1,4 @@
-"""Which nodes a need may have, and what nobody is given."""
+"""Which nodes a need may have, and what no component is given."""
 
 from __future__ import annotations
 

@@ -27,12 +27,12 @@ CAMERA = '[device]\nnode = "/dev/video0"\n[device.properties]\nID_BUS = "usb"\n'
 @asynccontextmanager
 async def watching(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
     """What a source of these folders tells while the context lasts."""
-    async with telling(DeviceSlotSource(folders)) as told:
+    async with events_of(DeviceSlotSource(folders)) as told:
         yield told
 
 
 @asynccontextmanager
-async def telling(source: DeviceSlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
+async def events_of(source: DeviceSlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
     """What a source tells while the context lasts."""
     told: asyncio.Queue[Event] = asyncio.Queue()
     task = asyncio.create_task(source.watch(told.put_nowait))
@@ -43,7 +43,7 @@ async def telling(source: DeviceSlotSource) -> AsyncIterator[asyncio.Queue[Event
         await asyncio.gather(task, return_exceptions=True)
 
 
-async def heard(told: asyncio.Queue[Event]) -> Event:
+async def next_event(told: asyncio.Queue[Event]) -> Event:
     return await asyncio.wait_for(told.get(), 30.0)
 
 
@@ -51,7 +51,7 @@ async def heard(told: asyncio.Queue[Event]) -> Event:
 async def test_devices_that_are_there_are_told(tmp_path: Path) -> None:
     (tmp_path / "front.toml").write_text(CAMERA)
     async with watching(tmp_path) as told:
-        event = await heard(told)
+        event = await next_event(told)
     assert isinstance(event, DeviceAppeared)
     assert event.found.nodes == (DeviceNode(Path("/dev/video0"), {"ID_BUS": "usb"}),)
 
@@ -64,9 +64,9 @@ async def test_devices_come_and_go(tmp_path: Path) -> None:
         unfinished = tmp_path / "made/.front.part"
         unfinished.write_text(CAMERA)
         unfinished.rename(file)
-        assert isinstance(await heard(told), DeviceAppeared)
+        assert isinstance(await next_event(told), DeviceAppeared)
         file.unlink()
-        assert await heard(told) == DeviceRemoved("front")
+        assert await next_event(told) == DeviceRemoved("front")
 
 
 @pytest.mark.anyio
@@ -74,11 +74,11 @@ async def test_device_that_changes_is_replugged(tmp_path: Path) -> None:
     file = tmp_path / "front.toml"
     file.write_text(CAMERA)
     async with watching(tmp_path) as told:
-        await heard(told)
+        await next_event(told)
         file.write_text(CAMERA.replace("video0", "video1"))
         # Written in place, it may also be seen empty in between: that is no device.
-        assert await heard(told) == DeviceRemoved("front")
-        event = await heard(told)
+        assert await next_event(told) == DeviceRemoved("front")
+        event = await next_event(told)
         assert isinstance(event, DeviceAppeared)
         assert event.found.nodes[0].node == Path("/dev/video1")
 
@@ -89,7 +89,7 @@ async def test_broken_file_hurts_no_other(tmp_path: Path, caplog: pytest.LogCapt
     (tmp_path / "b.toml").write_text(CAMERA)
     (tmp_path / "notes.txt").write_text("no device")
     async with watching(tmp_path) as told:
-        event = await heard(told)
+        event = await next_event(told)
     assert isinstance(event, DeviceAppeared)
     assert event.device == "b"
     assert "DEVICE_SLOT" in caplog.text
@@ -109,8 +109,8 @@ async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended
     (slots / "eye.toml").symlink_to("files/eye.toml")  # that is slots/files/eye.toml
     (slots / "front.toml").write_text(CAMERA)
     source = DeviceSlotSource([slots])
-    async with telling(source) as told:
-        await heard(told)
+    async with events_of(source) as told:
+        await next_event(told)
         found = {Path(problem.where).name: problem for problem in source.problems}
         assert {name: problem.code for name, problem in found.items()} == {
             "a.toml": "DEVICE_SLOT",
@@ -122,7 +122,7 @@ async def test_files_that_stand_for_no_device_are_problems_until_they_are_mended
         (slots / "pipe.toml").unlink()
         (slots / ".next").symlink_to(file)
         (slots / ".next").rename(slots / "eye.toml")
-        assert isinstance(await heard(told), DeviceAppeared)
+        assert isinstance(await next_event(told), DeviceAppeared)
         assert source.problems == ()
 
 
@@ -132,7 +132,7 @@ async def test_devices_of_a_folder_that_cannot_be_read_for_a_moment_stay(
 ) -> None:
     (tmp_path / "a.toml").write_text(CAMERA)
     source = DeviceSlotSource([tmp_path])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert isinstance(await told.get(), DeviceAppeared)
         (tmp_path / ".b").write_text(CAMERA)
         with descriptors_left(0):
@@ -157,13 +157,13 @@ async def test_devices_of_other_folders_go_while_one_cannot_be_read(tmp_path: Pa
         (folder / "eye.toml").write_text(CAMERA)
     (left / "bad.toml").write_text("[device\n")
     source = DeviceSlotSource([left, right])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         for _ in range(2):
-            await heard(told)
+            await next_event(told)
         left.rename(tmp_path / "away")
         left.symlink_to("x" * 300)  # ENAMETOOLONG: not to be followed, nor said to lead nowhere
         (right / "eye.toml").unlink()
-        event = await heard(told)
+        event = await next_event(told)
         assert isinstance(event, DeviceRemoved)
         assert event.device == "right/eye"
         assert {problem.code: problem.where for problem in source.problems} == {
@@ -173,11 +173,13 @@ async def test_devices_of_other_folders_go_while_one_cannot_be_read(tmp_path: Pa
 
 
 @pytest.mark.anyio
-async def test_device_whose_file_cannot_be_read_stays(tmp_path: Path, clock: VirtualClock) -> None:
+async def test_device_stays_while_its_file_cannot_be_read(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
     file = tmp_path / "a.toml"
     file.write_text(CAMERA)
     source = DeviceSlotSource([tmp_path])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert isinstance(await told.get(), DeviceAppeared)
         (tmp_path / ".next").symlink_to("/proc/self/mem")  # reading its first byte is an EIO
         (tmp_path / ".next").rename(file)
@@ -197,7 +199,7 @@ async def test_two_folders_keep_their_devices_apart(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "eye.toml").write_text(CAMERA)
     async with watching(tmp_path / "left", tmp_path / "right") as told:
-        names = {getattr(await heard(told), "device", "") for _ in range(2)}
+        names = {getattr(await next_event(told), "device", "") for _ in range(2)}
     assert names == {"left/eye", "right/eye"}
 
 

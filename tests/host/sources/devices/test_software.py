@@ -1,4 +1,4 @@
-"""Who has the software for a device that nobody uses."""
+"""Which payloads have the software for a device that no component uses."""
 
 from __future__ import annotations
 

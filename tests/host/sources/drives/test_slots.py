@@ -30,12 +30,12 @@ TOO_LONG = "x" * 300
 
 @contextlib.asynccontextmanager
 async def watched(*folders: Path) -> AsyncIterator[asyncio.Queue[Event]]:
-    async with telling(SlotSource(folders)) as told:
+    async with events_of(SlotSource(folders)) as told:
         yield told
 
 
 @contextlib.asynccontextmanager
-async def telling(source: SlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
+async def events_of(source: SlotSource) -> AsyncIterator[asyncio.Queue[Event]]:
     told: asyncio.Queue[Event] = asyncio.Queue()
     task = asyncio.create_task(source.watch(told.put_nowait))
     try:
@@ -74,7 +74,7 @@ async def test_drives_of_a_folder_that_cannot_be_read_for_a_moment_stay(
     slots = tmp_path / "slots"
     (slots / "a").mkdir(parents=True)
     source = SlotSource([slots])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
         assert await told.get() == DrivesScanned("slot", ("a",))
         await until_async("the drive was looked at", lambda: not looking())
@@ -103,7 +103,7 @@ async def test_drives_of_other_folders_go_while_one_cannot_be_read(tmp_path: Pat
     for drive in (left / "a", right / "b"):
         drive.mkdir(parents=True)
     source = SlotSource([left, right])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert [(await told.get()) for _ in range(3)][-1] == DrivesScanned(
             "slot", ("left/a", "right/b")
         )
@@ -117,12 +117,12 @@ async def test_drives_of_other_folders_go_while_one_cannot_be_read(tmp_path: Pat
         assert await told.get() == DriveRemoved("left/a")
 
 
-async def test_drive_whose_entry_cannot_be_read_stays(tmp_path: Path) -> None:
+async def test_drive_stays_while_its_entry_cannot_be_read(tmp_path: Path) -> None:
     slots = tmp_path / "slots"
     (slots / "a").mkdir(parents=True)
     (slots / "dangling").symlink_to(tmp_path / "nothing")
     source = SlotSource([slots])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert await told.get() == DriveInserted("a", slots / "a", "slot")
         assert await told.get() == DrivesScanned("slot", ("a",))
         (slots / "a").rmdir()
@@ -137,7 +137,7 @@ async def test_drive_whose_entry_cannot_be_read_stays(tmp_path: Path) -> None:
         assert await told.get() == DriveRemoved("a")
 
 
-async def test_drive_goes_though_watches_cannot_be_made_anew(
+async def test_drive_goes_though_watches_cannot_be_renewed(
     tmp_path: Path, clock: VirtualClock
 ) -> None:
     slots = tmp_path / "slots"
@@ -179,7 +179,7 @@ async def test_link_that_leads_nowhere_is_a_problem_until_it_leads_somewhere(
     slots.mkdir()
     (slots / "usb").symlink_to("usb")
     source = SlotSource([slots])
-    async with telling(source) as told:
+    async with events_of(source) as told:
         assert await told.get() == DrivesScanned("slot", ())
         (problem,) = source.problems
         assert (problem.code, problem.where) == ("SLOT_DANGLING", str(slots / "usb"))
@@ -210,10 +210,10 @@ async def test_links_that_lead_nowhere_are_no_drives(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [b"clear\x1b[2J", b"two\nlines", b"bell\x07", b"latin-1 \xff"])
-async def test_entry_whose_name_cannot_be_shown_is_told_and_not_read(
+async def test_entry_with_a_name_that_cannot_be_shown_is_told_and_not_read(
     tmp_path: Path, name: bytes
 ) -> None:
-    """Whoever labels a stick names the folder that it is mounted at."""
+    """The label of a stick becomes the name of the folder that it is mounted at."""
     slots = tmp_path / "slots"
     async with watched(slots) as told:
         await told.get()
@@ -297,7 +297,7 @@ def write_payload(drive: Path, text: str, name: str = "org.example.lamp") -> Non
 
 
 @pytest.mark.parametrize("is_link", [True, False], ids=["link", "folder"])
-async def test_payload_that_is_built_anew_in_place_is_told_without_a_removal(
+async def test_payload_that_is_built_again_in_place_is_told_without_a_removal(
     tmp_path: Path, is_link: bool
 ) -> None:
     slots = tmp_path / "slots"
@@ -347,7 +347,7 @@ async def test_what_is_not_listed_yet_is_not_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("how", ["deleted", "moved", "moved above"])
-async def test_link_whose_folder_goes_is_pulled_and_comes_back_with_it(
+async def test_link_is_pulled_with_its_folder_and_comes_back_with_it(
     tmp_path: Path, how: str
 ) -> None:
     slots, drive = tmp_path / "slots", tmp_path / "work/drive"

@@ -1,4 +1,4 @@
-"""Who is where: hints about other hosts, by multicast and by asking; they are never trusted."""
+"""Discovery: hints where other hosts are, by multicast and by asking; they are never trusted."""
 
 from nondum.transport.discovery.announcement import Announcement
 from nondum.transport.discovery.discovery import Discovery

@@ -1,4 +1,4 @@
-"""What a host tells of itself to whoever looks for hosts. It is public, and nobody believes it."""
+"""The public announcement of a host. It proves nothing: receivers treat it as a hint only."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Announcement:
 
     @property
     def is_on_this_machine_only(self) -> bool:
-        """Whether nobody else can reach it."""
+        """Whether it listens on loopback addresses only."""
         return all(is_loopback(host) for host in self.hosts)
 
 

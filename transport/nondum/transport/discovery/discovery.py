@@ -62,13 +62,13 @@ class Discovery:
         self._on_hint, self._on_gone = on_hint, on_gone
         self._wants_multicast = multicast
         self._loop = asyncio.get_running_loop()
-        self._book = HintTable(announcement.key, announcement.epoch, prefers, self._loop.time())
+        self._table = HintTable(announcement.key, announcement.epoch, prefers, self._loop.time())
         self._responder = Responder(announcement)
         self._asker = Asker(
             [StaticHost.parse(host) for host in static],
             announcement.security,
-            on_hint=self._heard,
-            on_gone=lambda key: self._tell(self._book.remove(key, Source.STATIC)),
+            on_hint=self._take_hint,
+            on_gone=lambda key: self._tell(self._table.remove(key, Source.STATIC)),
             on_refused=self._refused,
         )
         self._multicast: Multicast | None = None
@@ -80,8 +80,8 @@ class Discovery:
 
     @property
     def hints(self) -> Mapping[PeerKey, Hint]:
-        """Who may be where now; 512 peers at most, of 16 addresses each."""
-        return self._book.hints
+        """The current hints: 512 peers at most, with 16 addresses each."""
+        return self._table.hints
 
     async def start(self) -> None:
         """Begin to look and to be found. A network may come later: what does not work yet is told
@@ -101,27 +101,27 @@ class Discovery:
         self._dirty.set()
 
     def look_again(self) -> None:
-        """Ask static hosts anew now: something about them may have changed."""
+        """Ask static hosts again now: something about them may have changed."""
         self._asker.hurry()
 
     def status(self) -> DiscoveryStatus:
         """What was done and met."""
         responder, multicast = self._responder.problem, self._multicast
-        problems = [self._book.problem(), responder, multicast.problem if multicast else None]
+        problems = [self._table.problem(), responder, multicast.problem if multicast else None]
         every = network.read()
         used = {one.name for one in self._looked_on(every)}
         return DiscoveryStatus(
             interfaces=tuple(self._row(one, is_used=one.name in used) for one in every),
             static=self._asker.rows,
-            hints=len(self._book.hints),
-            refused=dict(self._book.refused),
+            hints=len(self._table.hints),
+            refused=dict(self._table.refused),
             problems=tuple(one for one in problems if one is not None),
         )
 
     @property
     def identity_problem(self) -> Problem | None:
         """What a person must know of another host under this one's key or name."""
-        return self._book.problem()
+        return self._table.problem()
 
     async def close(self) -> None:
         """Say goodbye, and let go of everything."""
@@ -143,8 +143,8 @@ class Discovery:
 
         return Multicast(
             self._announcement.security,
-            on_hint=self._heard,
-            on_gone=lambda key: self._tell(self._book.remove(key, Source.MULTICAST)),
+            on_hint=self._take_hint,
+            on_gone=lambda key: self._tell(self._table.remove(key, Source.MULTICAST)),
             on_refused=self._refused,
         )
 
@@ -187,19 +187,19 @@ class Discovery:
 
     def _again_s(self) -> float:
         """When to say again that this host is there: together, hosts are never much to hear."""
-        often_s = AGAIN_S * (1 + len(self._book.heard) / MANY)
+        often_s = AGAIN_S * (1 + len(self._table.received) / MANY)
         return min(often_s, RARELY_S) * random.uniform(0.8, 1.2)
 
     def _say_again(self) -> None:
         self._again = self._loop.call_later(self._again_s(), self._say_again)
         if self._multicast is not None:
             self._multicast.announce()
-        for one in self._book.heard:
+        for one in self._table.received:
             is_silent = self._loop.time() - one.at_s > SILENT_S
             if one.hint.source is Source.MULTICAST and is_silent:
-                self._tell(self._book.remove(one.hint.key, Source.MULTICAST))
+                self._tell(self._table.remove(one.hint.key, Source.MULTICAST))
 
-    def _heard(self, hint: Hint) -> None:
+    def _take_hint(self, hint: Hint) -> None:
         addresses = hint.addresses
         if hint.source is Source.MULTICAST:
             addresses = worth_trying(addresses, self._interfaces)
@@ -207,14 +207,14 @@ class Discovery:
                 return self._refused(_NOWHERE)
         interface = network.of_host(host_of(addresses[0]), self._interfaces)
         found = replace(hint, addresses=addresses, interface=interface)
-        is_new = not self._book.knows(hint.key)
-        change = self._book.add(found, self._loop.time())
+        is_new = not self._table.knows(hint.key)
+        change = self._table.add(found, self._loop.time())
         if is_new and change.told is not None and self._multicast is not None:
             self._multicast.greet()
         return self._tell(change)
 
     def _refused(self, problem: Problem) -> None:
-        self._book.refused[problem.code] += 1
+        self._table.refused[problem.code] += 1
 
     def _tell(self, change: Change) -> None:
         if change.gone is not None:
@@ -223,7 +223,7 @@ class Discovery:
             self._on_hint(change.told)
 
     def _row(self, interface: Interface, *, is_used: bool) -> InterfaceRow:
-        heard = [one for one in self._book.heard if one.hint.interface == interface.name]
+        heard = [one for one in self._table.received if one.hint.interface == interface.name]
         multicast = self._multicast
         return InterfaceRow(
             interface=interface.name,

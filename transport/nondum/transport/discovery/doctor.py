@@ -1,7 +1,7 @@
 """Whether other hosts can be found over this machine's network, for `nondum doctor network`.
 
-Nothing here needs a daemon, and nothing disturbs one: what is sent is one question of multicast
-DNS, as any host sends it, and one question to whoever listens on this machine already.
+These checks need no daemon, and disturb none: they send one question by multicast DNS, as any host
+does, and one question to the process that already listens on this machine.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def judge_used(used: Sequence[Interface]) -> Finding:
 
 
 def judge_memberships(used: int) -> Finding:
-    """Whether one program may listen on so many interfaces (igmp_max_memberships)."""
+    """Whether one program may listen on `used` interfaces (igmp_max_memberships)."""
     limit = memberships()
     if limit is None:
         return Finding("memberships", "", Result.OK, "this system does not limit them")
@@ -149,7 +149,7 @@ def try_udp(port: int) -> Finding:
 def _taken(check: str, port: int, error: OSError) -> Finding:
     if name := _who_answers(port):
         return Finding(check, "", Result.OK, f"the daemon of {name} listens there")
-    told = f"{error.strerror}, and whoever has it does not answer as a host does"
+    told = f"{error.strerror}, and the program that has the port does not answer as a host does"
     fix = "end the other program, or set another port in `peers.listen`"
     return Finding(check, "", Result.BAD, told, fix)
 
@@ -167,18 +167,18 @@ def _who_answers(port: int) -> str:
     return answer.txt.get("id", "") if answer.nonce == nonce else ""
 
 
-def _echo(interface: Interface, air: LoopbackTest) -> Finding:
+def _echo(interface: Interface, test: LoopbackTest) -> Finding:
     try:
-        is_heard = air.has_echo()
+        has_come_back = test.has_echo()
     except OSError as error:
         told = f"multicast cannot be used there: {error.strerror or error}"
         fix = f"look at the addresses and routes of {interface.name}, and who has UDP port {PORT}"
-        return Finding(air.check, interface.name, Result.BAD, told, fix)
-    if is_heard:
-        return Finding(air.check, interface.name, Result.OK, "what is sent there is heard here too")
-    told = "what is sent there is not even heard here"
+        return Finding(test.check, interface.name, Result.BAD, told, fix)
+    if has_come_back:
+        return Finding(test.check, interface.name, Result.OK, "packets sent there come back here")
+    told = "packets sent there do not come back, not even to this machine"
     fix = f"let UDP port {PORT} in and out in this machine's firewall"
-    return Finding(air.check, interface.name, Result.BAD, told, fix)
+    return Finding(test.check, interface.name, Result.BAD, told, fix)
 
 
 def _firewall(port: int) -> Finding:

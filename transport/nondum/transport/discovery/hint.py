@@ -1,7 +1,7 @@
-"""Where a peer may be: what somebody has said, parsed and bounded, but never trusted.
+"""Hints: claims where a peer may be, parsed and limited in size, but never trusted.
 
 Two encodings have the same fields: the TXT record of DNS-SD (RFC 6763, section 6), and the answer
-to a host that asks (`asking.py`). Whatever a stranger sends, parsing gives a `Hint` or raises
+to a host that asks (`packets.py`). Whatever a stranger sends, parsing gives a `Hint` or raises
 `ProtocolViolation`.
 """
 
@@ -32,9 +32,9 @@ class Source(Enum):
     """How a hint came."""
 
     MULTICAST = "multicast"
-    """Anybody on the network may have said it."""
+    """Any host on the network may have said it."""
     STATIC = "static"
-    """Whoever is at an address that the integrator has given."""
+    """The host at an address from `peers.static` said it."""
 
 
 @dataclass(frozen=True, slots=True)

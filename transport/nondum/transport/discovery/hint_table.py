@@ -1,4 +1,4 @@
-"""What is hinted at now: bounded, whoever says what. Pure; times are given.
+"""The table of current hints, limited in size against floods. Pure; times are given.
 
 A flood of invented hosts may push out other hints, never those of preferred peers or of hosts that
 the integrator has given.
@@ -22,8 +22,8 @@ NEW_PEERS_PER_S = 32.0
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """One hint, and when it came."""
+class ReceivedHint:
+    """One hint, and when it was received."""
 
     hint: Hint
     at_s: float
@@ -48,7 +48,7 @@ class HintTable:
         """`key` and `epoch` are this host's own; `prefers` names peers that matter."""
         self._key, self._epoch = key, epoch
         self._prefers = prefers
-        self._heard: dict[PeerKey, dict[Source, Heard]] = {}
+        self._received: dict[PeerKey, dict[Source, ReceivedHint]] = {}
         self._newcomers = TokenBucket(NEW_PEERS_PER_S, MAX_PEERS, now_s)
         self.refused: Counter[str] = Counter()
         """Hints that were of no use, by code."""
@@ -58,17 +58,17 @@ class HintTable:
     @property
     def hints(self) -> Mapping[PeerKey, Hint]:
         """One hint a peer, of everything that is said of it."""
-        every = ((key, merged(by_source)) for key, by_source in self._heard.items())
+        every = ((key, merged(by_source)) for key, by_source in self._received.items())
         return {key: hint for key, hint in every if hint is not None}
 
     @property
-    def heard(self) -> tuple[Heard, ...]:
+    def received(self) -> tuple[ReceivedHint, ...]:
         """Every hint, the oldest peer first."""
-        return tuple(one for by_source in self._heard.values() for one in by_source.values())
+        return tuple(one for by_source in self._received.values() for one in by_source.values())
 
     def knows(self, key: PeerKey) -> bool:
         """Whether a peer is hinted at."""
-        return key in self._heard
+        return key in self._received
 
     def add(self, hint: Hint, now_s: float) -> Change:
         """Take a hint. Those of this host itself are kept apart."""
@@ -77,29 +77,29 @@ class HintTable:
                 self.duplicate = hint
             return Change()
         gone = None
-        if hint.key not in self._heard:
+        if hint.key not in self._received:
             if not self._may_enter(hint, now_s):
                 self.refused["HINT_CROWDED"] += 1
                 return Change()
-            gone = self._make_room()
-        by_source = self._heard.setdefault(hint.key, {})
+            gone = self._evict()
+        by_source = self._received.setdefault(hint.key, {})
         before = merged(by_source)
         by_source.pop(hint.source, None)
-        by_source[hint.source] = Heard(hint, now_s)  # the last heard is the last in order
+        by_source[hint.source] = ReceivedHint(hint, now_s)  # the last received is the last in order
         return Change(_news(before, merged(by_source)), gone)
 
     def remove(self, key: PeerKey, source: Source) -> Change:
         """Forget what a source said of a peer."""
         if key == self._key and self.duplicate and self.duplicate.source is source:
             self.duplicate = None
-        by_source = self._heard.get(key, {})
+        by_source = self._received.get(key, {})
         if source not in by_source:
             return Change()
         before = merged(by_source)
         del by_source[source]
         if by_source:
             return Change(_news(before, merged(by_source)))
-        del self._heard[key]
+        del self._received[key]
         return Change(gone=key)
 
     def problem(self) -> Problem | None:
@@ -116,31 +116,31 @@ class HintTable:
             "IDENTITY_DUPLICATE",
             f"another host, {other.name}, has this host's key, at {at}",
             where=fingerprint(self._key),
-            fix="one of the two is a copy: take the key file away there, and start it anew",
+            fix="one of the two is a copy: delete the key file there, and start that host again",
         )
 
     def _may_enter(self, hint: Hint, now_s: float) -> bool:
         matters = hint.source is Source.STATIC or self._prefers(hint.key)
         if not matters and not self._newcomers.take(1, now_s):
             return False
-        return len(self._heard) < MAX_PEERS or self._oldest_stranger() is not None
+        return len(self._received) < MAX_PEERS or self._oldest_stranger() is not None
 
-    def _make_room(self) -> PeerKey | None:
-        if len(self._heard) < MAX_PEERS:
+    def _evict(self) -> PeerKey | None:
+        if len(self._received) < MAX_PEERS:
             return None
         oldest = self._oldest_stranger()
         assert oldest is not None
-        del self._heard[oldest]
+        del self._received[oldest]
         return oldest
 
     def _oldest_stranger(self) -> PeerKey | None:
-        for key, by_source in self._heard.items():
+        for key, by_source in self._received.items():
             if Source.STATIC not in by_source and not self._prefers(key):
                 return key
         return None
 
 
-def merged(by_source: Mapping[Source, Heard]) -> Hint | None:
+def merged(by_source: Mapping[Source, ReceivedHint]) -> Hint | None:
     """All that is said of one peer: the latest, with every address, those given by hand first."""
     if not by_source:
         return None

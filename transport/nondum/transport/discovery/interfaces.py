@@ -24,8 +24,8 @@ IPInterface: TypeAlias = ipaddress.IPv4Interface | ipaddress.IPv6Interface
 _SIOCGIFFLAGS = 0x8913
 _MEMBERSHIPS = Path("/proc/sys/net/ipv4/igmp_max_memberships")
 _VIRTUAL = re.compile(r"(docker|br-|veth|virbr|vnet|podman|cni|flannel|cali|lxc|lxd|incus|zt).*")
-"""Bridges and cables inside this machine: whoever is behind them is not another host, and joining
-them all floods a machine that runs containers."""
+"""Bridges and virtual cables inside this machine: no other host is behind them, and joining them
+all floods a machine that runs containers."""
 
 
 class Flags(IntFlag):

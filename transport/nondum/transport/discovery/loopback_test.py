@@ -28,13 +28,13 @@ class LoopbackTest:
         return "IPv6 multicast" if ":" in self.group else "IPv4 multicast"
 
     def has_echo(self) -> bool:
-        """Send a question, as any host sends it; whether it comes back. Raises `OSError`."""
+        """Whether a question, sent as any host sends it, comes back. Raises `OSError`."""
         question = _question()
-        with self._ear() as ear:
+        with self._receiver() as receiver:
             self._say(question)
-            return _comes(ear, question)
+            return _comes(receiver, question)
 
-    def _ear(self) -> socket.socket:
+    def _receiver(self) -> socket.socket:
         family, level, join = (
             (socket.AF_INET6, socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP)
             if ":" in self.group
@@ -62,12 +62,12 @@ class LoopbackTest:
             sock.sendto(data, (self.group, PORT))
 
 
-def _comes(ear: socket.socket, wanted: bytes) -> bool:
+def _comes(receiver: socket.socket, wanted: bytes) -> bool:
     until_s = time.monotonic() + PATIENCE_S
     while (left_s := until_s - time.monotonic()) > 0:
-        ear.settimeout(left_s)
+        receiver.settimeout(left_s)
         try:
-            if ear.recv(9000) == wanted:
+            if receiver.recv(9000) == wanted:
                 return True
         except TimeoutError:
             return False

@@ -90,7 +90,7 @@ class MdnsListener(RecordUpdateListener):
         return self._on_hint(hint)
 
     def _properties(self, info: AsyncServiceInfo) -> Iterable[tuple[bytes, bytes | None]]:
-        """The TXT record of the packet itself: of two in the cache, nobody knows which is newer."""
+        """The TXT record of the packet: of two in the cache, it is unknown which is newer."""
         if (text := self._texts.get(info.name)) is not None:
             info = AsyncServiceInfo(SERVICE, info.name, properties=text)
         return info.properties.items()

@@ -33,13 +33,13 @@ from nondum.transport.peers.keys import PeerKey, fingerprint
 APPEAR_S = (0.0, 1.0, 2.5)
 """When a host is announced after a change: the first packets over a new link may get lost."""
 GREET_S = 0.25
-"""Time between two greetings at least, whoever comes: a hundred hosts may boot at once."""
+"""Least time between two greetings of new hosts: a hundred hosts may boot at once."""
 GREET_JITTER_S = 0.02
 _QUERY, _POINTER, _INTERNET = 0, 12, 1  # RFC 1035: flags, type PTR, class IN
 
 
 class Multicast:
-    """On the air from the first `reconcile` to `close`."""
+    """Multicast DNS of this host, from the first `reconcile` to `close`."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Multicast:
         on_refused: Callable[[Problem], None],
     ) -> None:
         """Only hosts that are secured alike are told of."""
-        self._ears = MdnsListener(security, on_hint, on_gone, on_refused)
+        self._listener = MdnsListener(security, on_hint, on_gone, on_refused)
         self._loop = asyncio.get_running_loop()
         self._zeroconf: AsyncZeroconf | None = None
         self._info: AsyncServiceInfo | None = None
@@ -59,7 +59,7 @@ class Multicast:
         self._timers: list[asyncio.TimerHandle] = []
         self._greeting: asyncio.TimerHandle | None = None
         self._greeted_s = -GREET_S
-        self._on_air: list[str] = []
+        self._used_interfaces: list[str] = []
         self.problem: Problem | None = None
         """Why it does not work at all."""
         self.unused: dict[str, Problem] = {}
@@ -81,14 +81,14 @@ class Multicast:
         else:
             self.problem = None
             self.unused = self._find_unused(interfaces)
-        self._on_air = [one.name for one in interfaces if one.name not in self.unused]
+        self._used_interfaces = [one.name for one in interfaces if one.name not in self.unused]
 
     def announce(self) -> None:
         """Say once more that this host is there."""
         if self._zeroconf is not None and self._info is not None:
             zeroconf = self._zeroconf.zeroconf
             zeroconf.async_send(zeroconf.generate_service_broadcast(self._info, None))
-            self.announced_s = dict.fromkeys(self._on_air, self._loop.time())
+            self.announced_s = dict.fromkeys(self._used_interfaces, self._loop.time())
 
     def appear(self) -> None:
         """Say that this host is there and ask who else is, now and a few times soon."""
@@ -97,7 +97,7 @@ class Multicast:
         self._timers = [self._loop.call_later(delay_s, self._appear) for delay_s in APPEAR_S]
 
     def greet(self) -> None:
-        """Somebody new was heard, and need not wait for the next announcement to hear this host."""
+        """Announce this host soon, for a new host: it need not wait for the next announcement."""
         if self._greeting is None:
             since_s = self._loop.time() - self._greeted_s
             wait_s = max(GREET_S - since_s, random.uniform(0, GREET_JITTER_S))
@@ -119,7 +119,7 @@ class Multicast:
             self._zeroconf = await self._open(choice)
             self._choice = choice
         if self._info is None:
-            # Names are unique by construction, so nobody need be asked for a second.
+            # Names are unique by construction: no need for a second of probing (RFC 6762, 8.1).
             told = self._zeroconf.async_register_service(info, cooperating_responders=True)
             self._keep(await told)
         elif _records(info) != _records(self._info):
@@ -132,8 +132,8 @@ class Multicast:
     async def _open(self, choice: list[str | int]) -> AsyncZeroconf:
         version = IPVersion.All if has_ipv6() else IPVersion.V4Only
         opened = AsyncZeroconf(interfaces=choice, ip_version=version)
-        # At once: of what is heard before, zeroconf would take the next telling for a duplicate.
-        opened.zeroconf.async_add_listener(self._ears, None)
+        # At once: zeroconf drops the repetition of an earlier packet as a duplicate.
+        opened.zeroconf.async_add_listener(self._listener, None)
         try:
             await opened.zeroconf.async_wait_for_start()
         except BaseException:
@@ -214,7 +214,7 @@ def _not_joined(interface: Interface, joined: int) -> Problem:
     if limit is not None and joined > limit:
         return Problem(
             "MULTICAST_MEMBERSHIPS",
-            "the system does not let one program listen on so many interfaces",
+            f"the system does not let one program listen on {joined} interfaces",
             where=interface.name,
             need=str(joined),
             have=str(limit),

@@ -1,7 +1,7 @@
 """The question "who is there?" and its answer, each one datagram. Pure.
 
-A question carries 16 random bytes, which only whoever saw it can send back, and is padded to the
-length of the longest answer: nobody can have a host send more than he has sent himself.
+A question carries 16 random bytes, which only a host that received it can send back. It is padded
+to the length of the longest answer, so that hosts cannot be used to amplify traffic.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Which of the addresses that a stranger has named are worth a try. Pure.
 
-Anybody may announce any address, and every host that hears it dials: so hosts must not be led to
-knock at machines far away, or at the services of their own machine.
+Any host may announce any address, and every host that receives it dials: an announcement must not
+make hosts dial machines far away, or local services.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ async def resolve(host: str, port: int) -> tuple[str, ...]:
             tell(partial(_settle, found, error))
 
     def tell(what: Callable[[], None]) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+        with contextlib.suppress(RuntimeError):  # the loop is closed: nothing waits any more
             loop.call_soon_threadsafe(what)
 
     try:

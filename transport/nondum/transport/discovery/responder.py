@@ -1,4 +1,4 @@
-"""Answers whoever asks this host who it is, at the UDP port of the number that peers dial."""
+"""Answers "who is there?" by UDP, at the port number that peers dial by TCP."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class Asker:
         try:
             answer = packets.read_answer(data)
             if answer.nonce not in self._open:
-                return  # late, or nobody has asked
+                return  # late, or not an answer to a question of this host
             end, answers = self._open[answer.nonce]
             hint = from_txt(
                 answer.txt, answer.port, [end], source=Source.STATIC, security=self._security
@@ -199,7 +199,7 @@ class _Receiver(asyncio.DatagramProtocol):
 def _silent(host: StaticHost) -> Problem:
     return Problem(
         "STATIC_SILENT",
-        "nobody answers there",
+        "no host answers there",
         where=str(host),
         fix=f"look whether nondum runs there, and whether UDP and TCP port {host.port} are open",
     )

@@ -88,7 +88,7 @@ class Catalogues:
         on_event: Callable[[FleetEvent], None],
         links: Callable[[], Links],
     ) -> None:
-        """`handler` serves what is not the seam's own; `links` is asked from the first event on."""
+        """`handler` serves all other methods; `links` is used from the first event on."""
         self._ledger = Ledger(epoch)
         self._handler, self._on_event, self._links = handler, on_event, links
         self._known: dict[PeerKey, _Known] = {}
@@ -102,7 +102,7 @@ class Catalogues:
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:
-        """Who is there, with their catalogues."""
+        """The peers that are linked, with their catalogues."""
         return {key: self._peer(known) for key, known in self._known.items()}
 
     def publish(self, changes: Mapping[str, Body | None]) -> None:
@@ -120,8 +120,8 @@ class Catalogues:
         told = {"revision": self._told.revision, "digest": self._told.digest}
         self._links().notify_all(STATE, told)
 
-    def heard(self, peer: PeerKey, state: State) -> None:
-        """A peer's ping told its state."""
+    def receive_state(self, peer: PeerKey, state: State) -> None:
+        """Take in the state that a peer's ping told."""
         if known := self._known.get(peer):
             known.replica.hear(state)
             self._see_to(known)
@@ -141,7 +141,7 @@ class Catalogues:
                 self._on_event(event)
 
     def serve(self, incoming: IncomingCall) -> Body | Awaitable[Body]:
-        """Carry out what is the seam's own, and pass the rest on."""
+        """Answer calls of the fleet's own methods, and pass the others to the handler."""
         if incoming.method == READ:
             return self._answer(incoming)
         if incoming.method.startswith(OWN_METHODS):
@@ -149,17 +149,20 @@ class Catalogues:
         return self._handler.serve(incoming)
 
     def notice(self, caller: Admission, method: str, args: dict[str, Any]) -> None:
-        """Take in what is the seam's own, and pass the rest on. Raises `ProtocolViolation`."""
+        """Take in notices of the fleet's own methods, and pass the others to the handler.
+
+        Raises `ProtocolViolation`.
+        """
         if method == CHANGED:
             if known := self._known.get(caller.key):
                 self._told_of(known, parse(args))
         elif method == STATE:
-            self.heard(caller.key, read_state(args))
+            self.receive_state(caller.key, read_state(args))
         elif not method.startswith(OWN_METHODS):
             self._handler.notice(caller, method, args)
 
     def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
-        """Nobody needs an answer about catalogues any more; of the rest the handler decides."""
+        """Stop a call about catalogues; the handler decides about other calls."""
         if incoming.method.startswith(OWN_METHODS):
             return Lease.STOP
         return self._handler.orphaned(incoming, reason)
@@ -185,7 +188,7 @@ class Catalogues:
         )
 
     def _replica(self, key: PeerKey, epoch: int) -> Replica:
-        """The one from before it was away, if the peer has not started anew since."""
+        """The replica from before the peer was away, unless the peer has restarted since."""
         kept = self._away.pop(key, None)
         return kept if kept is not None and kept.epoch == epoch else Replica(epoch)
 
@@ -226,7 +229,7 @@ class Catalogues:
         return last.to_body()
 
     def _see_to(self, known: _Known) -> None:
-        """Have a peer's catalogue read where that is needed, and nobody does."""
+        """Start to read a peer's catalogue where that is needed and not under way."""
         if known.reading is None and _is_wanting(known):
             known.reading = self._loop.create_task(self._read(known))
 

@@ -25,7 +25,8 @@ MAX_CATALOGUE = 4 << 20
 """Bytes of all keys and packed entries of a host."""
 MAX_PARTS = 128
 """Messages that changes may take: those of a full catalogue and of what was in it before."""
-_ROOM = MAX_MESSAGE - 1024
+_MOST_BYTES = MAX_MESSAGE - 1024
+"""Bytes of keys and packed entries in one message."""
 _FRAMING = 16
 """Bytes that msgpack adds to a key and a value, and some; a message's table has few enough so."""
 
@@ -120,7 +121,7 @@ def _tables(changes: Iterable[tuple[str, bytes | None]]) -> Iterator[dict[str, b
     filled = 0
     for key, packed in changes:
         needed = size(key, packed or b"")
-        if table and filled + needed > _ROOM:
+        if table and filled + needed > _MOST_BYTES:
             yield table
             table, filled = {}, 0
         table[key] = packed

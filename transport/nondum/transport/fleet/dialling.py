@@ -1,4 +1,4 @@
-"""Who dials whom, and where: a policy over hints. Hints are never trusted: the connection decides.
+"""Which hosts this host dials, and where, by hints. Hints prove nothing: the connection decides.
 
 Of two hosts one need dial. The one with the smaller key does so at once, the other one when there
 is no link a second later: perhaps only that direction works.
@@ -21,7 +21,7 @@ PATIENCE_S = 1.0
 PATIENCE_FOR_EACH_S = 0.1
 """… and so much more for every other peer that it looks for: when all start at once, it takes."""
 AT_ONCE = 8
-"""Peers that are dialled anew at the same time, or all handshakes would be late in the end."""
+"""Peers that are dialled at the same time: with more, all handshakes would be late."""
 TURN_S = 2.0
 """How long one of them may keep others waiting; it is dialled on after that."""
 ADDRESSES = 16
@@ -33,7 +33,7 @@ WISHES = 256
 REMEMBERED_S = 3600.0
 """How long a peer is looked for that is neither there nor hinted at any more."""
 CALM_S = 1.0
-"""Hints that change more often than this have a peer dialled anew only so often."""
+"""Least time between two dials of a peer whose hints keep changing."""
 
 
 class Dialler(Protocol):
@@ -77,7 +77,7 @@ class DialPolicy:
         self._mine, self._dialler, self._is_welcome = mine, dialler, is_welcome
         self._wishes: dict[PeerKey, _Wish] = {}
         self._turns: dict[PeerKey, asyncio.TimerHandle] = {}
-        """Who is being dialled anew."""
+        """Peers that are being dialled."""
         self._queue: deque[PeerKey] = deque()
         self._loop = asyncio.get_running_loop()
         self._is_closed = False
@@ -88,7 +88,7 @@ class DialPolicy:
         return len(self._wishes)
 
     def hinted(self, key: PeerKey, addresses: Iterable[str], epoch: int = 0) -> None:
-        """Somebody said where a peer is; perhaps again."""
+        """A hint about a peer came; perhaps the same again."""
         if self._is_closed or key == self._mine or not self._is_welcome(key):
             return
         wish = self._wish(key)
@@ -101,7 +101,7 @@ class DialPolicy:
             self._dial_in(key, self._courtesy_s(key))
 
     def gone(self, key: PeerKey) -> None:
-        """Nobody says any more where a peer is: it is looked for where it was."""
+        """No hint names a peer any more: it is dialled at its last addresses."""
         wish = self._wishes.get(key)
         if wish is None:
             return
@@ -150,7 +150,7 @@ class DialPolicy:
                 self._dial_in(key, 0.0)
 
     def close(self) -> None:
-        """Dial nobody any more, whatever is hinted at."""
+        """Dial no peer any more, whatever the hints."""
         self._is_closed = True
         for wish in self._wishes.values():
             self._stop(wish)
@@ -167,7 +167,7 @@ class DialPolicy:
         return PATIENCE_S + PATIENCE_FOR_EACH_S * (unlinked - 1)
 
     def _wish(self, key: PeerKey) -> _Wish | None:
-        """The wish for a peer, made where there is room for one more."""
+        """The wish for a peer; a new one where the limit allows it."""
         if key not in self._wishes and len(self._wishes) >= WISHES:
             never_met = (
                 key for key, one in self._wishes.items() if not one.is_linked and not one.worked

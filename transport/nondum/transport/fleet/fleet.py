@@ -13,7 +13,7 @@ from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey
 
 OWN_METHODS = "fleet."
-"""Calls and notices that begin so are the seam's own: no handler ever sees one."""
+"""Calls and notices that begin so are the fleet's own: no handler ever sees one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Fleet(Protocol):
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:
-        """Who can be called now."""
+        """The peers that can be called now."""
 
     def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
         """Call a peer; await the result for the answer, or iterate over its progress.

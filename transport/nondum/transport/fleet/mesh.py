@@ -69,7 +69,7 @@ class Mesh:
             trust,
             self._catalogues,
             on_event=self._on_event,
-            pulse=Pulse(self._catalogues.state, self._catalogues.heard),
+            pulse=Pulse(self._catalogues.state, self._catalogues.receive_state),
             epoch=self.epoch,
             clock=clock,
             allowance=allowance,
@@ -100,12 +100,12 @@ class Mesh:
 
     @property
     def refusals(self) -> Refusals:
-        """Who was turned away, and why."""
+        """Hosts that were turned away, and why."""
         return self._node.refusals
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:
-        """Who can be called now."""
+        """The peers that can be called now."""
         return self._catalogues.peers
 
     async def start(self) -> None:
@@ -133,7 +133,7 @@ class Mesh:
         self._node.identity.check_address(address)
 
     def no_more_hints(self, key: PeerKey) -> None:
-        """Nobody says any more where a host is. A link to it stays while it works."""
+        """No hint names a host any more. A link to it stays while it works."""
         self._meeting.gone(key)
 
     def set_trust(self, trust: Trust) -> None:
@@ -171,7 +171,7 @@ class Mesh:
         """Whether a host might be let in, by its key alone."""
         if self.security is Security.DEVELOPMENT:
             return True
-        return self._trust.standing(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
+        return self._trust.state_of(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
 
     def _on_event(self, event: PeerEvent) -> None:
         match event:

@@ -1,9 +1,9 @@
 """The fleet by way of a Zenoh router: for more hosts than a mesh is good for, and wide areas.
 
 What is secured is the link to the router (TLS; a certificate of this host's, where the router asks
-for one). Hosts do not prove their keys to each other, and the router reads what they say: whoever
-it lets in can speak for anybody. Trust still decides who is a peer, but it is the router's word
-that they are who they say: `security` and `admitted_by` tell so.
+for one). Hosts do not prove their keys to each other, and the router can read their messages: a
+host that the router accepts can claim any key. Trust still decides which keys are peers, but relies
+on the router for who has which key: `security` and `admitted_by` tell so.
 """
 
 from __future__ import annotations
@@ -72,12 +72,12 @@ class ZenohFleet:
 
     @property
     def refusals(self) -> Refusals:
-        """Who was turned away, and why."""
+        """Hosts that were turned away, and why."""
         return self._node.refusals
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:
-        """Who can be called now."""
+        """The peers that can be called now."""
         return self._catalogues.peers
 
     async def start(self) -> None:

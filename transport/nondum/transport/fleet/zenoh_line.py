@@ -1,8 +1,8 @@
 """This host's session with a Zenoh router: who is present there, and messages to and fro.
 
 Needs the extra `zenoh` (eclipse-zenoh). Everything of that library is used here and nowhere else:
-its callbacks come on threads of its own and hop to the loop; what may wait for the network runs on
-one more thread. Shared memory is off: a router took hundreds of megabytes for it.
+its callbacks come on its own threads and hop to the loop; what may wait for the network runs on one
+more thread. Shared memory is off: a router took hundreds of megabytes for it.
 
 Below `nondum/FLEET`, where a place is `KEY/EPOCH` with the key in hexadecimal:
 `here/PLACE` liveliness, `to/PLACE/PLACE/NUMBER` a message to the first place from the second,
@@ -113,7 +113,7 @@ class RouterAccess:
 
 @dataclass(frozen=True, slots=True)
 class Listeners:
-    """Who is told of what comes; on the loop."""
+    """Callbacks for what arrives; called on the loop."""
 
     present: Callable[[Place, bool], None]
     """A host appeared, or is gone. Also this one."""
@@ -134,11 +134,11 @@ class _Arrived(NamedTuple):
 class Line:
     """The session, which is opened again and again until there is a router."""
 
-    def __init__(self, access: RouterAccess, me: Place, ears: Listeners) -> None:
+    def __init__(self, access: RouterAccess, me: Place, listeners: Listeners) -> None:
         """Made on the running loop. Raises `PeerRefused` as `RouterAccess.to_config`."""
         access.check()
         self._config, self._root, self._me = access.to_config(), f"nondum/{access.fleet}", me
-        self._ears = ears
+        self._listeners = listeners
         self._loop = asyncio.get_running_loop()
         self._arrived: deque[_Arrived] = deque()
         self._arrived_bytes = 0
@@ -147,7 +147,7 @@ class Line:
         self._waiting_bytes = 0
         self._has_work = threading.Condition()
         self._declared: tuple[object, ...] = ()
-        """Kept: what nobody refers to is undeclared."""
+        """Kept, since Zenoh undeclares an object without references."""
         self._is_open = False
         self._is_closed = False
         self._thread = threading.Thread(target=self._work, name="zenoh", daemon=True)
@@ -219,12 +219,12 @@ class Line:
             try:
                 session: zenoh.Session = library.open(self._config)
             except library.ZError as error:
-                self._hop(lambda told=str(error): self._ears.trouble(_unreached(told)))  # type: ignore[misc]  # told is bound
+                self._hop(lambda told=str(error): self._listeners.trouble(_unreached(told)))  # type: ignore[misc]  # told is bound
                 with self._has_work:
                     self._has_work.wait(CONNECT_S)
                 continue
             with self._has_work:
-                self._is_open = True  # before anybody hears of this host, and wants an answer
+                self._is_open = True  # before another host learns of this one, and wants an answer
             self._declare(session)
             self._hop(self.opened.set)
             return session
@@ -247,21 +247,21 @@ class Line:
         place = _read_place(key, epoch)
         if place is not None and number.isdecimal() and len(number) <= 16:
             data = sample.payload.to_bytes()
-            self._hop(lambda: self._ears.message(place, int(number), data), len(data))
+            self._hop(lambda: self._listeners.message(place, int(number), data), len(data))
 
     def _on_to_all(self, sample: zenoh.Sample) -> None:
         *_, key, epoch = str(sample.key_expr).split("/")
         place = _read_place(key, epoch)
         if place is not None and place != self._me:
             data = sample.payload.to_bytes()
-            self._hop(lambda: self._ears.to_all(place, data), len(data))
+            self._hop(lambda: self._listeners.to_all(place, data), len(data))
 
     def _on_presence(self, sample: zenoh.Sample) -> None:
         *_, key, epoch = str(sample.key_expr).split("/")
         place = _read_place(key, epoch)
         if place is not None:
             is_there = sample.kind == _library().SampleKind.PUT
-            self._hop(lambda: self._ears.present(place, is_there))
+            self._hop(lambda: self._listeners.present(place, is_there))
 
     def _hop(self, take: Callable[[], None], size: int = 0) -> None:
         """Have the loop take something in; messages are dropped when it is far behind."""

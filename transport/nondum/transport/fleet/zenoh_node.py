@@ -44,13 +44,13 @@ START_S = 3.0
 """How long the start waits for a router; it is looked for ever after."""
 OVERTAKEN_S = 0.1
 """News that a host is gone may overtake its goodbye."""
-DOORS = 1024
-"""Lives of peers that are remembered."""
+MOST_LINK_STATES = 1024
+"""Link states that are kept, one for each run of a peer."""
 
 
 @dataclass(slots=True)
-class _Listener:
-    """What is between this host and one life of another."""
+class _LinkState:
+    """The link between this host and one run of another."""
 
     number: int = 0
     """Of the last link; counts up, so that messages of earlier ones are known."""
@@ -117,21 +117,21 @@ class ZenohNode:
             terms=TERMS,
         )
         self._loop = asyncio.get_running_loop()
-        ears = Listeners(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
-        self._line = Line(access, self._me, ears)
+        listeners = Listeners(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
+        self._line = Line(access, self._me, listeners)
         self._present: set[Place] = set()
-        self._listeners: dict[Place, _Listener] = {}
+        self._link_states: dict[Place, _LinkState] = {}
         self._told: dict[PeerKey, str] = {}
         self._tending: asyncio.TimerHandle | None = None
         self._is_closed = False
 
     @property
     def peers(self) -> Mapping[PeerKey, Admission]:
-        """Who can be called now."""
+        """The peers that can be called now."""
         return {key: session.admission for key, session in self._peer_table.sessions.items()}
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
-        """Not measured: nobody is pinged."""
+        """Not measured: no peer is pinged."""
         return None
 
     async def start(self) -> None:
@@ -175,9 +175,9 @@ class ZenohNode:
         if self._tending is not None:
             self._tending.cancel()
         self._peer_table.close()
-        for door in self._listeners.values():
-            if door.timer is not None:
-                door.timer.cancel()
+        for state in self._link_states.values():
+            if state.timer is not None:
+                state.timer.cancel()
         await self._line.close()
 
     def _on_present(self, place: Place, is_there: bool) -> None:  # noqa: FBT001  # told by the line
@@ -191,31 +191,31 @@ class ZenohNode:
         self._loop.call_later(OVERTAKEN_S, self._on_gone, place)
 
     def _on_gone(self, place: Place) -> None:
-        door = self._listeners.get(place)
-        if place not in self._present and door is not None and door.link is not None:
-            self._peer_table.break_link(door.link, Loss.DISCONNECTED)
+        state = self._link_states.get(place)
+        if place not in self._present and state is not None and state.link is not None:
+            self._peer_table.break_link(state.link, Loss.DISCONNECTED)
 
     def _on_message(self, place: Place, number: int, data: bytes) -> None:
         if self._is_closed or place.key == self._me.key:
             return
-        door = self._listener(place)
+        state = self._link_state(place)
         if data == _OVER:
-            if door.link is not None and number == door.number:
-                self._peer_table.break_link(door.link, Loss.DISCONNECTED)
+            if state.link is not None and number == state.number:
+                self._peer_table.break_link(state.link, Loss.DISCONNECTED)
             return
-        if number > door.number and not self._is_greeter(place):
-            self._open(door, place, number, dialled=False)
-        if number == door.number and door.link is not None:
-            self._peer_table.receive(door.link, data)
+        if number > state.number and not self._is_greeter(place):
+            self._open(state, place, number, dialled=False)
+        if number == state.number and state.link is not None:
+            self._peer_table.receive(state.link, data)
 
     def _on_to_all(self, place: Place, data: bytes) -> None:
-        door = self._listeners.get(place)
-        if door is None:
+        state = self._link_states.get(place)
+        if state is None:
             return
-        if door.link is None:
-            self._line.send(place, door.number, _OVER)  # if it has not heard so yet
-        elif door.link.session is not None:
-            self._peer_table.receive(door.link, data)
+        if state.link is None:
+            self._line.send(place, state.number, _OVER)  # it may not know yet
+        elif state.link.session is not None:
+            self._peer_table.receive(state.link, data)
 
     def _on_trouble(self, problem: Problem) -> None:
         self._tell(PeerKey(""), problem)
@@ -227,57 +227,57 @@ class ZenohNode:
     def _is_welcome(self, key: PeerKey) -> bool:
         if self.identity.security is Security.DEVELOPMENT:
             return True
-        return self._gate.trust.standing(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
+        return self._gate.trust.state_of(key) in (TrustState.ADMITTED, TrustState.MUST_CERTIFY)
 
-    def _listener(self, place: Place) -> _Listener:
-        if place not in self._listeners and len(self._listeners) >= DOORS:
-            self._forget_listener()
-        return self._listeners.setdefault(place, _Listener())
+    def _link_state(self, place: Place) -> _LinkState:
+        if place not in self._link_states and len(self._link_states) >= MOST_LINK_STATES:
+            self._forget_link_state()
+        return self._link_states.setdefault(place, _LinkState())
 
-    def _forget_listener(self) -> None:
+    def _forget_link_state(self) -> None:
         unused = (
-            at for at, door in self._listeners.items() if door.link is None and not door.timer
+            at for at, state in self._link_states.items() if state.link is None and not state.timer
         )
-        others = (at for at, door in self._listeners.items() if _is_stranger(door))
+        others = (at for at, state in self._link_states.items() if _is_stranger(state))
         gone = next(unused, None) or next(others, None)
         if gone is not None:
-            del self._listeners[gone]
+            del self._link_states[gone]
 
-    def _open(self, door: _Listener, place: Place, number: int, *, dialled: bool) -> Link:
-        replaced, door.link = door.link, None
+    def _open(self, state: _LinkState, place: Place, number: int, *, dialled: bool) -> Link:
+        replaced, state.link = state.link, None
         if replaced is not None:
             replaced.cut()
-        door.number = number
+        state.number = number
         route = _Route(self._line, place, number, lambda: self._on_cut(place, number))
-        # The key is not proved: whoever the router lets in is believed.
+        # The key is not proved: any host that the router accepts is believed.
         proved = place.key if self.identity.security is Security.CURVE else None
-        door.link = Link(route, proved, self._loop.time(), dialled=dialled)
-        return door.link
+        state.link = Link(route, proved, self._loop.time(), dialled=dialled)
+        return state.link
 
     def _greet_in(self, place: Place, wait_s: float) -> None:
         if not self._is_greeter(place):
             return
-        door = self._listener(place)
-        if door.timer is None:
-            door.timer = self._loop.call_later(wait_s, self._greet, place, door)
+        state = self._link_state(place)
+        if state.timer is None:
+            state.timer = self._loop.call_later(wait_s, self._greet, place, state)
 
-    def _greet(self, place: Place, door: _Listener) -> None:
-        door.timer = None
-        if place not in self._present or door.link is not None or not self._is_welcome(place.key):
+    def _greet(self, place: Place, state: _LinkState) -> None:
+        state.timer = None
+        if place not in self._present or state.link is not None or not self._is_welcome(place.key):
             return
-        number = max(door.number + 1, int(self._loop.time() * 1000))
-        link = self._open(door, place, number, dialled=True)
+        number = max(state.number + 1, int(self._loop.time() * 1000))
+        link = self._open(state, place, number, dialled=True)
         link.on_refused = functools.partial(self._on_refused, link, place)
-        door.timer = self._loop.call_later(ANSWER_S, self._expect, place, door, link)
+        state.timer = self._loop.call_later(ANSWER_S, self._expect, place, state, link)
         self._peer_table.greet(link, place.key)
 
-    def _expect(self, place: Place, door: _Listener, link: Link) -> None:
+    def _expect(self, place: Place, state: _LinkState, link: Link) -> None:
         """The greeting should have been answered by now."""
-        door.timer = None
+        state.timer = None
         if link.session is None and not link.is_over:
             self._on_refused(link, place, _UNANSWERED)
         elif link.is_over:
-            self._greet_in(place, door.wait_s)
+            self._greet_in(place, state.wait_s)
 
     def _on_refused(self, link: Link, place: Place, problem: Problem) -> None:
         self._tell(place.key, problem)
@@ -285,19 +285,19 @@ class ZenohNode:
 
     def _on_cut(self, place: Place, number: int) -> None:
         """A link is over: greet again, if the other is still there."""
-        door = self._listeners.get(place)
-        if door is None or door.number != number or door.link is None:
+        state = self._link_states.get(place)
+        if state is None or state.number != number or state.link is None:
             return
-        link, door.link = door.link, None
-        if door.timer is not None:
-            door.timer.cancel()
-            door.timer = None
+        link, state.link = state.link, None
+        if state.timer is not None:
+            state.timer.cancel()
+            state.timer = None
         if link.session is not None:
-            door.wait_s = FIRST_WAIT_S
+            state.wait_s = FIRST_WAIT_S
             self._told.pop(place.key, None)
         if not self._is_closed and place in self._present:
-            self._greet_in(place, door.wait_s)
-            door.wait_s = min(2 * door.wait_s, LONGEST_WAIT_S)
+            self._greet_in(place, state.wait_s)
+            state.wait_s = min(2 * state.wait_s, LONGEST_WAIT_S)
 
     def _tell(self, key: PeerKey, problem: Problem) -> None:
         if self._told.get(key) != problem.code:
@@ -308,13 +308,13 @@ class ZenohNode:
         self._tending = self._loop.call_later(TEND_S, self._tend)
         self._peer_table.tend()
         now_s = self._loop.time()
-        for door in list(self._listeners.values()):
-            if _is_stranger(door) and door.link and now_s - door.link.heard_s > SILENCE_S:
-                door.link.cut()
+        for state in list(self._link_states.values()):
+            if _is_stranger(state) and state.link and now_s - state.link.heard_s > SILENCE_S:
+                state.link.cut()
 
 
-def _is_stranger(door: _Listener) -> bool:
-    return door.link is None or door.link.session is None
+def _is_stranger(state: _LinkState) -> bool:
+    return state.link is None or state.link.session is None
 
 
 _OVER = b""

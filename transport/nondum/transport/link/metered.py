@@ -1,6 +1,4 @@
-"""Packets of which only so many, and so many bytes, a second are taken in: a flood ends its own
-connection.
-"""
+"""Packets with a limit on their number and bytes a second: a flood ends its own connection."""
 
 from __future__ import annotations
 

@@ -14,10 +14,10 @@ from nondum.transport.peers import tcp
 AWAITED_S = 4.5
 """How long a connection may take to become a peer's: a little less than ZeroMQ's own handshake."""
 MAX_STRANGERS = 256
-"""Connections that are no peers yet; the oldest makes room."""
+"""Connections that are no peers yet; beyond that the oldest is cut."""
 STRANGERS_BYTES = 64 * 1024
 """What a connection may send before it is a peer's. ZeroMQ bounds messages, but not their number of
-parts: one that never ends would fill the memory before anybody sees it."""
+parts: one that never ends would fill the memory before it is delivered."""
 
 
 @dataclass(slots=True)
@@ -25,7 +25,7 @@ class Accepted:
     """One connection."""
 
     end: str
-    """The other end as `tcp.written`; empty when it was gone before anybody looked."""
+    """The other end as `tcp.written`; empty when the connection was gone before this was read."""
     since_s: float
     is_peer: bool = False
     has_spoken: bool = False
@@ -44,7 +44,7 @@ class AcceptedConnections:
         return sum(not one.is_peer for one in self._known.values())
 
     def opened(self, descriptor: int, now_s: float) -> Iterator[str]:
-        """A connection was accepted; ends of those that were cut to make room."""
+        """A connection was accepted; the ends of older ones that were cut for it."""
         end = tcp.other_end(descriptor)
         known = self._known.get(descriptor)
         if end and known is not None and known.end == end:
@@ -66,7 +66,7 @@ class AcceptedConnections:
         self._known[descriptor] = Accepted(tcp.other_end(descriptor), now_s, is_peer=True)
 
     def closed(self, descriptor: int) -> bool:
-        """The connection is gone; whether it was a stranger's of which nobody has told anything."""
+        """The connection is gone; whether it was a stranger's that has sent no message."""
         known = self._known.pop(descriptor, None)
         return known is not None and not known.is_peer and not known.has_spoken
 

@@ -1,5 +1,7 @@
-"""How much a peer may send of its own accord: far more than any host needs, and too little to keep
-this one from its work."""
+"""The rate limit for messages that a peer sends unasked.
+
+It is far more than any host needs, and too little to keep this host from its work.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,7 @@ def greetings() -> TokenBucket:
 
 
 def cost(length: int) -> int:
-    """What a message of so many bytes counts as.
+    """How many messages one of `length` bytes counts as.
 
     >>> cost(100), cost(128 * 1024)
     (1, 9)
@@ -55,9 +57,9 @@ def cost(length: int) -> int:
 
 
 class Paced(Generic[T]):
-    """Hands on what a peer sends, in order, and no faster than it is allowed to.
+    """Passes on what a peer sends, in order, and no faster than it is allowed to send.
 
-    Whoever waits for answers is slowed down by that, and never has too much waiting.
+    That slows down a peer that waits for answers, so it never has too much waiting.
     """
 
     def __init__(self, bucket: TokenBucket, hand_on: Callable[[T], None]) -> None:

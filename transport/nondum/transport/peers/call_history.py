@@ -67,7 +67,7 @@ class CallHistory:
         return Seen.ANSWERED if number in self._answers else Seen.FORGOTTEN
 
     def answered(self, number: int, answer: bytes) -> None:
-        """Keep the answer of a running call; the oldest answers make room."""
+        """Keep the answer of a running call; beyond the limits the oldest answers are dropped."""
         self._running.discard(number)
         self._answers[number] = answer
         self._size += len(answer)
@@ -82,7 +82,7 @@ class CallHistory:
         """The caller has all answers to calls with lower numbers: forget them.
 
         Answers are kept in the order of their giving, so this looks at the oldest only; what stays
-        behind a younger one goes later, or when room is needed.
+        behind a younger one goes later, or when the limits are reached.
         """
         while self._answers:
             number, answer = next(iter(self._answers.items()))

@@ -76,7 +76,7 @@ class Call:
         """Settle it with an error, which need not be fetched."""
         if not self._outcome.done():
             self._outcome.set_exception(error)
-            self._outcome.exception()  # mark as seen: nobody may be waiting
+            self._outcome.exception()  # mark as seen: perhaps nothing awaits it
         self._finish()
 
     def _finish(self) -> None:
@@ -131,7 +131,7 @@ class Calls:
             self._tell(Cancel(number))
 
     def succeed(self, number: int, body: dict[str, Any]) -> None:
-        """An answer came; one to a call that nobody waits for any more is ignored."""
+        """An answer came; an answer to a call that is over is ignored."""
         if call := self._pending.pop(number, None):
             call.succeed(body)
 

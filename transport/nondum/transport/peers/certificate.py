@@ -165,7 +165,7 @@ def _check_time(found: Certificate, now: datetime) -> None:
                 where=found.host,
                 need=f"{found.not_before:{_TIME}} to {found.not_after:{_TIME}}",
                 have=f"{now.astimezone(UTC):{_TIME}}",
-                fix="look at this host's clock, then have the certificate issued anew",
+                fix="look at this host's clock, then have the certificate issued again",
             )
         )
 

@@ -15,7 +15,7 @@ from typing import TypeVar
 GROWN_BYTES = 4 << 20
 """Memory of this process that is not there without a reason."""
 LOOKS = 20
-"""After so many, each connection has had its turn."""
+"""Looks in which each connection has its turn once."""
 
 T = TypeVar("T")
 

@@ -17,7 +17,7 @@ FIRST_SOCKETS = 16
 
 
 def see_that_there_are(count: int = FIRST_SOCKETS) -> None:
-    """Take so many descriptors, and give them back. Raises `OSError` where there are fewer."""
+    """Take `count` descriptors, and give them back. Raises `OSError` where there are fewer."""
     with contextlib.ExitStack() as taken:
         for _ in range(count):
             taken.callback(os.close, os.eventfd(0))

@@ -1,7 +1,7 @@
 """The standing wish to be linked to one peer: all its addresses at once, the first one wins.
 
-Those of the link alone come a moment later.
-Every connection has a socket of its own. (ZeroMQ's own reconnecting sends what was queued for the
+Link-local addresses are tried a moment later.
+Every connection has a separate socket. (ZeroMQ's reconnecting sends what was queued for the
 connection before, retries a wrong key for ever, and a refused one never again.)
 """
 
@@ -186,13 +186,13 @@ class Dial:
         self._attempt(lasting or self.addresses)
         if lasting and self._others is None:
             others = tuple(one for one in self.addresses if one not in lasting)
-            self._others = self._loop.call_later(HEAD_START_S, self._try_others, others)
+            self._others = self._loop.call_later(HEAD_START_S, self._try_link_local, others)
         if self._limit is not None:
             self._limit.cancel()
         self._limit = self._loop.call_later(ANSWER_S, self._give_up)
         self.again()
 
-    def _try_others(self, addresses: Sequence[str]) -> None:
+    def _try_link_local(self, addresses: Sequence[str]) -> None:
         self._others = None
         if self._is_wanted(self.key) and not any(one.is_connected for one in self._attempts):
             self._attempt(addresses)
@@ -209,12 +209,12 @@ class Dial:
             self._limit = self._loop.call_later(GREETING_S, self._give_up_greeting)
         for attempt in list(self._attempts):
             if not attempt.is_connected:
-                self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))
+                self.over(attempt, Problem("PEER_SILENT", "no host answers there"))
 
     def _give_up_greeting(self) -> None:
         for attempt in list(self._attempts):
             if not attempt.is_settled:
-                self.over(attempt, Problem("PEER_SILENT", "nobody answers there"))
+                self.over(attempt, Problem("PEER_SILENT", "no host answers there"))
 
 
 def is_of_link(address: str) -> bool:

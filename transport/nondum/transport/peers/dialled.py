@@ -34,8 +34,8 @@ class Dialled:
                 """Whether what comes is encrypted (CURVE)."""
                 self.socket = Drained(socket, on_frames)
                 taken.callback(self.socket.close)
-                self._ears = Watch(socket, on_event)
-                taken.callback(self._ears.close)
+                self._monitor = Watch(socket, on_event)
+                taken.callback(self._monitor.close)
             except (OSError, zmq.ZMQError) as error:
                 told = f"nothing can be dialled now: {error.strerror}"
                 problem = Problem("DIAL_IMPOSSIBLE", told, fix=descriptors.remedy(error))
@@ -50,5 +50,5 @@ class Dialled:
 
     def close(self, linger_ms: int = 0) -> None:
         """Let go of the socket; what was sent may leave for `linger_ms` more."""
-        self._ears.close()
+        self._monitor.close()
         self.socket.close(linger_ms)

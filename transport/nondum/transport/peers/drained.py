@@ -85,7 +85,7 @@ class Drained:
             self._look_again()
 
     def _look_again(self) -> None:
-        """Drain on the loop's next turn if something came while nobody looked."""
+        """Drain on the loop's next turn if something came since the last look."""
         if (
             self._again is None
             and not self._is_held
@@ -95,8 +95,7 @@ class Drained:
             self._again = self._loop.call_soon(self.drain)
 
     def drain(self) -> bool:
-        """Take in what has come, `AT_ONCE` at most; whether nothing is left that waits, as far as
-        anybody looked.
+        """Take in what has come, `AT_ONCE` at most; False when more may wait.
 
         Also called when the end of a connection is told before what came over it, by the monitor.
         """

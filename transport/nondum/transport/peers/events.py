@@ -17,7 +17,7 @@ class Loss(Enum):
     DEPARTED = "it said goodbye"
     SILENT = "nothing was heard of it: the host hangs, or the network is gone"
     DISCONNECTED = "the connection broke and did not come back: the process ended"
-    RESTARTED = "it was started anew"
+    RESTARTED = "it has restarted"
     GAVE_UP = "it had given up the link itself"
     TURNED_AWAY = "it does not accept this host any more"
     REVOKED = "its key is not accepted any more"

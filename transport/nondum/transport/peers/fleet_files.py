@@ -42,7 +42,7 @@ def create(folder: Path, name: str) -> FleetPublic:
 
 
 def sign(folder: Path, host: HostPublic, *, now: datetime, days: int) -> Certificate:
-    """Certify a host, from a little before `now` (clocks differ), for so many days.
+    """Certify a host for a number of days, from a little before `now` (clocks differ).
 
     Raises `PeerRefused` (FILE_OPEN_TO_OTHERS, FILE_MALFORMED, HOST_NAME, CERTIFICATE_VALIDITY),
     `OSError`.

@@ -45,7 +45,7 @@ class Acquaintance:
     once: CallHistory = field(default_factory=CallHistory)
     next_number: int = 1
     allowance: TokenBucket = field(default_factory=USUAL.bucket)
-    """What it may still send of its own accord."""
+    """What it may still send unasked."""
     barred_until_s: float = float("-inf")
     """It has sent more: on the loop's clock."""
     greetings: TokenBucket = field(default_factory=greetings)
@@ -107,7 +107,7 @@ class Gate:
             return True
         if admission.by == "pairing":
             return admission.key in self.trust.paired
-        return self.trust.standing(admission.key) is TrustState.MUST_CERTIFY
+        return self.trust.state_of(admission.key) is TrustState.MUST_CERTIFY
 
     def has_expired(self, admission: Admission) -> bool:
         """Whether the certificate that let a peer in has ended."""
@@ -117,18 +117,18 @@ class Gate:
 _REASONS = {"KEY_REVOKED": Reason.REVOKED, "KEY_UNKNOWN": Reason.UNKNOWN_KEY}
 
 
-def judge(knock: ConnectionAttempt, me: Identity, trust: Trust) -> Reason | None:
+def judge(attempt: ConnectionAttempt, me: Identity, trust: Trust) -> Reason | None:
     """Whether a connection to a host may go on to greet: None, or why not."""
-    if knock.domain != DOMAIN:
+    if attempt.domain != DOMAIN:
         return Reason.WRONG_DOMAIN
     if me.security is Security.DEVELOPMENT:
-        is_here = knock.mechanism == "NULL" and is_loopback(knock.address)
+        is_here = attempt.mechanism == "NULL" and is_loopback(attempt.address)
         return None if is_here else Reason.MISMATCH
-    if knock.mechanism != "CURVE":
+    if attempt.mechanism != "CURVE":
         return Reason.MISMATCH
-    if knock.key == me.key:
+    if attempt.key == me.key:
         return Reason.DUPLICATE
-    match trust.standing(PeerKey(knock.key)):
+    match trust.state_of(PeerKey(attempt.key)):
         case TrustState.REVOKED:
             return Reason.REVOKED
         case TrustState.UNKNOWN:
@@ -148,7 +148,7 @@ def _stale(hello: Hello) -> Problem:
         "a host with this key has greeted later than this life of it began: two hosts share one "
         "key, or this is an old connection",
         where=hello.name,
-        fix="give the copied host keys of its own, if there are two",
+        fix="give the copied host new keys, if there are two",
     )
 
 
@@ -157,7 +157,7 @@ def _itself(hello: Hello) -> Problem:
         "PEER_DUPLICATE",
         "this is the host itself, or a copy of it with the same key",
         where=hello.name,
-        fix="give the copied host keys of its own, if there are two",
+        fix="give the copied host new keys, if there are two",
     )
 
 

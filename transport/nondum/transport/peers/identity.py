@@ -1,4 +1,4 @@
-"""Who this host is to its peers, and how links are secured."""
+"""The identity of this host for its peers, and how links are secured."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Security(Enum):
 
     CURVE = "keys"
     """Every link is encrypted, and both ends have proved their keys."""
-    ROUTER = "router: whoever it lets in is believed to be who they say"
+    ROUTER = "router: hosts that it lets in are believed without proof of their keys"
     """The link to a router is secured; peers have not proved their keys to each other."""
     DEVELOPMENT = "development: no keys, this machine only"
 

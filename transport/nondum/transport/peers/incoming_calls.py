@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 class Lease(Enum):
-    """What becomes of an errand whose caller is lost."""
+    """What becomes of a call whose caller is lost."""
 
     STOP = "stop"
     """It is cancelled at once."""
@@ -35,7 +35,7 @@ class Lease(Enum):
 
 
 class IncomingCall:
-    """One call, as whoever carries it out sees it."""
+    """One call from a peer, as the handler that carries it out sees it."""
 
     def __init__(
         self, caller: Admission, request: Request, report: Callable[[int, Body], None]
@@ -45,7 +45,7 @@ class IncomingCall:
         self.method = request.method
         self.args = dict(request.args)
         self.orphaned = asyncio.Event()
-        """Set when the caller is lost and the errand is held or finished."""
+        """Set when the caller is lost and the call is held or finished."""
         self.ends_s = asyncio.get_running_loop().time() + request.remaining_ms / 1000
         """Its deadline, on this host's loop's clock."""
         self._report = report
@@ -80,14 +80,14 @@ class Handler(Protocol):
         """A peer tells something."""
 
     def orphaned(self, incoming: IncomingCall, reason: Loss) -> Lease:
-        """The caller of a running errand is lost: decide what becomes of it."""
+        """Decide what becomes of a running call whose caller is lost."""
 
 
 Finished: TypeAlias = Reply | Failure
 
 
 class IncomingCalls:
-    """All that run for one peer, and the memory of those that ran."""
+    """The running calls of one peer, and the history of its earlier ones."""
 
     def __init__(self, caller: Admission, once: CallHistory, handler: Handler, send: Send) -> None:
         self._caller, self._once, self._handler, self._send = caller, once, handler, send
@@ -114,12 +114,12 @@ class IncomingCalls:
             incoming.halt()
 
     def pass_on_waiting(self) -> None:
-        """Try again to send the answers for which there was no room."""
+        """Send the answers that could not be sent before."""
         for _ in range(len(self._unsent)):
             self._pass_on(self._unsent.popleft())
 
     def lose(self, reason: Loss) -> list[IncomingCall]:
-        """The caller is lost: ask what becomes of each errand; those that run on."""
+        """The caller is lost: ask the handler about each call; the calls that run on."""
         kept = []
         self._send = _nowhere
         for incoming in list(self._running.values()):
@@ -137,7 +137,9 @@ class IncomingCalls:
         try:
             return self._handler.orphaned(incoming, reason)
         except Exception:
-            log.exception("nobody could say what becomes of %s: it is stopped", incoming.method)
+            log.exception(
+                "the handler could not decide what becomes of %s: it is stopped", incoming.method
+            )
             return Lease.STOP
 
     def _begin(self, request: Request) -> None:

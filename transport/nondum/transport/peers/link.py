@@ -112,7 +112,7 @@ class Link:
         self._pinged, self._pinged_s = number, now_s
         return self.send(data)
 
-    def heard_pong(self, number: int, now_s: float) -> None:
+    def pong_received(self, number: int, now_s: float) -> None:
         """A ping was answered."""
         if number == self._pinged:
             self.round_trip_s = now_s - self._pinged_s

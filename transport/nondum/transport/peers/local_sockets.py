@@ -56,7 +56,7 @@ class LocalSockets:
         self._is_held = False
         self._zap: ZapHandler | None = None
         self._listener: Drained | None = None
-        self._ears: Watch | None = None
+        self._monitor: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
         self._looking: asyncio.TimerHandle | None = None
         self._looks = Looks()
@@ -114,8 +114,8 @@ class LocalSockets:
                 timer.cancel()
         for route in self._dialled:
             route.cut()
-        if self._ears is not None:
-            self._ears.close()
+        if self._monitor is not None:
+            self._monitor.close()
         if self._listener is not None:
             self._listener.close(LINGER_MS)
         if self._zap is not None:
@@ -134,11 +134,11 @@ class LocalSockets:
             socket = listening(context, self._me.keys)
             taken.callback(socket.close, 0)
             await prove_enforced(socket, self._me.keys, self._zap.expect_probe)
-            ears = Watch(socket, self._arrivals.on_event)
-            taken.callback(ears.close)
+            monitor = Watch(socket, self._arrivals.on_event)
+            taken.callback(monitor.close)
             bound = tuple(_bind(socket, address) for address in addresses)
             self._listener = Drained(socket, self._on_frames)
-            self._ears = ears
+            self._monitor = monitor
             taken.pop_all()
         return bound
 
@@ -186,11 +186,11 @@ class LocalSockets:
             route.receiver = self._owner.on_accepted(route, proved)
         return route
 
-    def _judge(self, knock: ConnectionAttempt) -> Entry:
-        reason = judge(knock, self._me, self._trust)
+    def _judge(self, attempt: ConnectionAttempt) -> Entry:
+        reason = judge(attempt, self._me, self._trust)
         if reason is not None:
             now_s, told = self._loop.time(), "turned away at the handshake"
-            self._owner.on_refusal(Refusal(reason, knock.address, knock.key, told, now_s))
+            self._owner.on_refusal(Refusal(reason, attempt.address, attempt.key, told, now_s))
         return entry(reason)
 
     def _on_closed(self, descriptor: int) -> None:

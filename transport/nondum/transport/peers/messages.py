@@ -32,7 +32,7 @@ MAX_CERTIFICATE = 1024
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The first message of whoever dialled, and, as `Welcome`, the answer to it."""
+    """The first message of the host that dialled, and, as `Welcome`, the answer to it."""
 
     versions: tuple[int, ...]
     name: str

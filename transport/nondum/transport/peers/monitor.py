@@ -54,21 +54,21 @@ class Watch:
         # Not pyzmq's own name, made of the descriptor: descriptors come back, names linger.
         address = f"inproc://nondum.monitor.{next(_numbers)}"
         with contextlib.ExitStack() as taken:  # in the order in which `close` lets go of it
-            ears = socket.context.socket(zmq.PAIR)
-            taken.callback(ears.close, 0)
-            ears.linger = 0
-            ears.rcvhwm = 0  # or ZeroMQ's thread waits, while this host hangs, for news to be read
+            monitor = socket.context.socket(zmq.PAIR)
+            taken.callback(monitor.close, 0)
+            monitor.linger = 0
+            monitor.rcvhwm = 0  # else a hanging host makes ZeroMQ's thread wait until it reads
             socket.monitor(address, WATCHED)
             taken.callback(socket.disable_monitor)
-            ears.connect(address)
-            self._ears = Drained(ears, self._on_frames)
+            monitor.connect(address)
+            self._monitor = Drained(monitor, self._on_frames)
             taken.pop_all()
 
     def close(self) -> None:
-        """Stop, in this order: ZeroMQ waits for ever to tell its end to ears that are gone."""
-        if not self._ears.is_closed:
+        """Stop the monitor before its socket closes, or ZeroMQ waits for ever to send the end."""
+        if not self._monitor.is_closed:
             self._socket.disable_monitor()
-            self._ears.close()
+            self._monitor.close()
 
     def _on_frames(self, frames: list[zmq.Frame]) -> None:
         kind, value = _FORMAT.unpack(frames[0].bytes)

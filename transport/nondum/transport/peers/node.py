@@ -68,7 +68,7 @@ class PeerNode:
         self.epoch = epoch or fresh_epoch()
         """Tells this life of the host from earlier ones."""
         self.expected = 0
-        """How many peers it is to have, as far as anybody knows; for how often they are pinged."""
+        """How many peers it is expected to have; sets how often they are pinged."""
         self.refusals = Refusals(on_event)
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
@@ -98,7 +98,7 @@ class PeerNode:
 
     @property
     def peers(self) -> Mapping[PeerKey, Admission]:
-        """Who can be called now."""
+        """The peers that can be called now."""
         return {key: session.admission for key, session in self._peer_table.sessions.items()}
 
     @property
@@ -244,7 +244,7 @@ class PeerNode:
 
 
 class _AcceptedLink:
-    """What is told of a connection that another host made (see `Receiver`)."""
+    """The receiver of events of a connection that another host made (see `Receiver`)."""
 
     def __init__(
         self, link: Link, peer_table: PeerTable, on_misused: Callable[[Link, Reason], None]

@@ -2,8 +2,8 @@
 
 Commit, then reveal (the numeric comparison of Bluetooth Secure Simple Pairing, Core Specification
 vol 2 part H, 7.2): the answering host commits to its nonce before it sees the asking one's, so that
-nobody in the middle can search for a nonce which makes both codes equal. Its chance is one in a
-million a try. A bare short hash of the keys would be found in seconds.
+an attacker between the hosts cannot search for a nonce that makes both codes equal. Its chance is
+one in a million a try. A bare short hash of the keys would be found in seconds.
 
     asking host                                             answering host
     Ask(key, name)                       ──►
@@ -144,8 +144,8 @@ class PairingWindow:
         if self.tries >= TRIES:
             raise _refused(
                 "PAIRING_TRIES",
-                f"{TRIES} tries have failed: somebody may be between the two hosts",
-                fix="begin anew on both hosts, over a network that you trust",
+                f"{TRIES} attempts have failed: somebody may be between the two hosts",
+                fix="begin again on both hosts, over a network that you trust",
             )
         _check_time(self.opened_s + WINDOW_S, now_s)
         step = Step.AWAITING_COMMIT if role is Role.ASKING else Step.AWAITING_ASK
@@ -179,9 +179,9 @@ def receive(
         case Step.AWAITING_NONCE, Nonce(nonce):
             return _revealed(pairing, nonce)
         case Step.COMPARING, Agreed(proof) if not pairing.peer_agreed:
-            return _heard_agreed(pairing, proof), ()
+            return _receive_agreed(pairing, proof), ()
         case Step.AWAITING_AGREED, Agreed(proof):
-            return replace(_heard_agreed(pairing, proof), step=Step.PAIRED), ()
+            return replace(_receive_agreed(pairing, proof), step=Step.PAIRED), ()
     raise _refused(
         "PAIRING_ORDER", f"{type(message).__name__} came out of turn, while {pairing.step.value}"
     )
@@ -230,7 +230,7 @@ def _revealed(pairing: Pairing, nonce: bytes) -> tuple[Pairing, tuple[Message, .
     return comparing, ()
 
 
-def _heard_agreed(pairing: Pairing, proof: bytes) -> Pairing:
+def _receive_agreed(pairing: Pairing, proof: bytes) -> Pairing:
     theirs = Role.ANSWERING if pairing.role is Role.ASKING else Role.ASKING
     if not hmac.compare_digest(proof, _proof(pairing, theirs)):
         raise _refused("PAIRING_PROOF", "the other end agreed to something else")
@@ -268,7 +268,7 @@ def _check_time(ends_s: float, now_s: float) -> None:
         raise _refused(
             "PAIRING_OVER",
             f"the {WINDOW_S:.0f} seconds for pairing are over",
-            fix="begin anew on both hosts",
+            fix="begin again on both hosts",
         )
 
 

@@ -99,7 +99,7 @@ class PairingHost:
         self._dial: Dial | None = None
         self._try: Try | None = None
         self._confirmed: PeerKey | None = None
-        """Whose code the person here has said yes to: it is that host's also in a later try."""
+        """The host whose code the person here has confirmed: the yes holds in a later try, too."""
         self._came_to_nothing: Problem | None = None
         """What became of the last try with the host that is asked now."""
         self._timers: list[asyncio.TimerHandle] = []
@@ -194,7 +194,7 @@ class PairingHost:
         ending = asyncio.ensure_future(asyncio.to_thread(self._context.term))
         try:
             await asyncio.shield(ending)
-        finally:  # the context must go, also where whoever waits for it is cancelled
+        finally:  # the context must go, also when the task that waits for it is cancelled
             await asyncio.wait({ending})
 
     @property
@@ -406,7 +406,7 @@ class PairingHost:
         self._end(Failed(problem), Ending.OVER)
 
     def _beat(self) -> None:
-        """Look after what nobody tells of."""
+        """Check, now and then, what no event tells of."""
         self._timers[-1] = self._loop.call_later(BEAT_S, self._beat)
         assert self._listener is not None
         self._listener.cut_overdue()

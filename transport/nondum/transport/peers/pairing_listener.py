@@ -1,6 +1,6 @@
-"""The socket that a host is asked at while it can be paired: every key may knock, at this one only.
+"""The socket for pairing requests, open while a host can be paired. It accepts every other key.
 
-It has a context of its own, so that the answer to who may connect is nobody else's.
+It has a separate ZeroMQ context: a context has one ZAP handler, and this one accepts strangers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ life of a whole window, each some 40 bytes, are nearly all of that."""
 
 @dataclass(frozen=True, slots=True)
 class Asker:
-    """Who a message came from."""
+    """The sender of a message."""
 
     id: bytes
     """Of the connection."""
@@ -61,8 +61,8 @@ class PairingListener:
             socket = listening(context, keys)
             taken.callback(socket.close, 0)
             socket.setsockopt(zmq.MAXMSGSIZE, MAX_BYTES)
-            self._ears = Watch(socket, self._arrivals.on_event)
-            taken.callback(self._ears.close)
+            self._monitor = Watch(socket, self._arrivals.on_event)
+            taken.callback(self._monitor.close)
             socket.bind(address)
             bound = socket.getsockopt(zmq.LAST_ENDPOINT)
             assert isinstance(bound, bytes)
@@ -91,13 +91,15 @@ class PairingListener:
 
     def close(self, linger_ms: int) -> None:
         """Listen no more; what was said may leave for `linger_ms`."""
-        self._ears.close()
+        self._monitor.close()
         self._listener.close(linger_ms)
         self._zap.close()
 
-    def _judge(self, knock: ConnectionAttempt) -> Entry:
+    def _judge(self, attempt: ConnectionAttempt) -> Entry:
         is_let_in = (
-            knock.domain == DOMAIN and knock.mechanism == "CURVE" and knock.key != self._own_key
+            attempt.domain == DOMAIN
+            and attempt.mechanism == "CURVE"
+            and attempt.key != self._own_key
         )
         return Entry.LET_IN if is_let_in else Entry.TURNED_AWAY
 

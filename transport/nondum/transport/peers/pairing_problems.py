@@ -9,7 +9,7 @@ from nondum.transport.peers import pairing
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.pairing_messages import Ending
 
-_ANEW = "begin anew on both hosts, `nondum peers pair`, where it was not meant"
+_AGAIN = "if that was not meant, begin again on both hosts: `nondum peers pair`"
 _BOTH = "run `nondum peers pair` on both hosts at the same time, on one network"
 _RENAME = (
     "give one of the two another name, `name` under [host], start it again, and pair them then"
@@ -29,7 +29,7 @@ _ENDINGS = {
         fix="look at `nondum peers trust` there",
     ),
     Ending.TRIES: Problem(
-        "PAIRING_TRIES", "the other host has had too many tries", fix="begin anew on both hosts"
+        "PAIRING_TRIES", "the other host has had too many attempts", fix="begin again on both hosts"
     ),
     Ending.OVER: Problem("PAIRING_OVER", "the other host has closed its window", fix=_BOTH),
     Ending.BROKEN: Problem("PAIRING_BROKEN", "the other host did not understand this one"),
@@ -45,7 +45,7 @@ def ended(
     """
     if why is Ending.REFUSED and name:
         told = "the person at the other host said no: the codes differ, or it was not wanted"
-        return Problem("PAIRING_REFUSED", told, where=name, fix=_ANEW)
+        return Problem("PAIRING_REFUSED", told, where=name, fix=_AGAIN)
     if why is Ending.NAME:
         told = f"the other host is called {own_name} too, or knows another host of that name"
         return Problem("PAIRING_NAME", told, where=own_name, fix=_RENAME)
@@ -87,7 +87,7 @@ def unmet(last: Problem | None) -> Problem:
 
 
 def _silent(name: str, *, is_confirmed: bool, is_confirmed_there: bool) -> str:
-    """Who has not answered."""
+    """The people who have not answered, in words."""
     if is_confirmed:
         return f"no one at {name} has said yes"
     if is_confirmed_there:

@@ -42,7 +42,7 @@ class Comparing:
 
 @dataclass(frozen=True, slots=True)
 class Agreed:
-    """Both people said yes: this is whom to trust."""
+    """Both people said yes: the host to trust."""
 
     key: PeerKey
     name: str
@@ -50,7 +50,7 @@ class Agreed:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """Nobody was paired, and the window is closed."""
+    """No host was paired, and the window is closed."""
 
     problem: Problem
 

@@ -1,4 +1,4 @@
-"""Who is there: greetings make sessions, breaks and silence end them. No sockets."""
+"""The table of linked peers: greetings make sessions, breaks and silence end them. No sockets."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class PeerTable:
         now_s, session = self._loop.time(), link.session
         link.heard_s = now_s
         if session is not None:
-            self._presence.heard(link)
+            self._presence.received(link)
             if link.is_doubtful(now_s):
                 self._presence.doubt(session)
         try:
@@ -335,7 +335,7 @@ class PeerTable:
         for replaced in session.join(link):
             replaced.cut()
         if known_session is None:
-            # After the link has joined: whoever hears of it may call at once.
+            # After the link has joined: a subscriber to the event may call at once.
             self._on_event(
                 PeerUp(key, admission.name, known.epoch, link.route.address, admission.by)
             )
@@ -365,7 +365,7 @@ class PeerTable:
         self.lose(session, reason)
 
     def _keep(self, incoming: IncomingCall) -> None:
-        """Remember an errand that outlives its caller, until it ends."""
+        """Keep a call that outlives its caller, until it ends."""
         assert incoming.task is not None
         self._orphans.add(incoming)
         incoming.task.add_done_callback(lambda _: self._orphans.discard(incoming))

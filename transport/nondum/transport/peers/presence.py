@@ -1,5 +1,6 @@
-"""Watches the peers: asks late ones, directly and through others, and gives up those that do not
-answer. What is decided, and when, is in `suspicion`. No sockets.
+"""Watches the peers: asks late ones, directly and through other peers, and gives up silent ones.
+
+`suspicion` has the rules and times. No sockets.
 
 What a lying helper can do: vouch for a dead host, which is then given up later, once, by as long as
 a suspected host has to answer. It cannot have a host given up: no message says so.
@@ -23,13 +24,13 @@ from nondum.transport.peers.suspicion import Awake, Terms, Verdict, Watched
 HELPERS = 3
 """Peers that are asked about one that is late."""
 TICKS_AWAKE = 1.5
-"""Of the time between two looks, so many ticks count: if more has passed, the loop stood still."""
+"""Ticks that count between two looks: if more time has passed, the loop stood still."""
 SOONEST_S = 0.001
 """Between two looks at one link."""
 HEARD_AGAIN_S = 0.01
 """What comes so soon after something else is no news of who is there: it is not noted."""
 FIRST_PROBE = 2**40 * ANSWERED
-"""Pings that ask for an answer have numbers of their own, all of which every host answers."""
+"""First number of the pings that ask for an answer: hosts answer multiples of `ANSWERED`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,15 +68,15 @@ class Presence:
         """A link became a peer's; `beat_s` counts until each end has said its own."""
         link.beat_s = beat_s
         link.doubt_s = self.terms.doubt_s(beat_s)
-        self.heard(link)
+        self.received(link)
 
     def pinged(self, link: Link, now_s: float, beat_s: float) -> None:
         """This host has pinged a peer, and said that it will again in `beat_s`."""
         link.due_s = now_s + beat_s
         link.doubt_s = self.terms.doubt_s(beat_s)
 
-    def heard(self, link: Link) -> None:
-        """Something came over a link."""
+    def received(self, link: Link) -> None:
+        """Note that something came over a link."""
         now_s, before = self.awake_s(), link.watched
         if now_s - before.heard_s < HEARD_AGAIN_S and not before.is_suspected:
             return
@@ -136,7 +137,7 @@ class Presence:
             link.looking = self._loop.call_later(max(wait_s, SOONEST_S), self._look_soon, link)
 
     def _look_at_doubt(self, session: Session, doubt: Doubt) -> None:
-        """Ask again over the newest link; whoever goes on talking, but does not answer, is dead."""
+        """Ask again over the newest link; a peer that sends, but does not answer, is given up."""
         if self._loop.time() - doubt.since_s > self.terms.limit_s(self.terms.longest_beat_s):
             for link in list(session.links):
                 self._on_dead(link)

@@ -43,12 +43,18 @@ def replace(path: Path, text: str) -> None:
 
 
 def read_secret(path: Path) -> str:
-    """Read what nobody else may know. Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`."""
+    """Read a file that no other user may read.
+
+    Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`.
+    """
     return _read(path, _OTHERS_READ)
 
 
 def read_own(path: Path) -> str:
-    """Read what nobody else may change. Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`."""
+    """Read a file that no other user may change.
+
+    Raises `PeerRefused` (FILE_OPEN_TO_OTHERS), `OSError`.
+    """
     return _read(path, _OTHERS_WRITE)
 
 
@@ -56,7 +62,7 @@ def _read(path: Path, forbidden: int) -> str:
     with path.open("rb") as file:
         status = os.fstat(file.fileno())
         if status.st_mode & forbidden or status.st_uid not in (0, os.geteuid()):
-            raise PeerRefused(_open_to_others(path, status))
+            raise PeerRefused(_open_to_other_users(path, status))
         data = file.read(MAX_BYTES + 1)
     try:
         return data[:MAX_BYTES].decode("utf-8")
@@ -64,14 +70,14 @@ def _read(path: Path, forbidden: int) -> str:
         raise PeerRefused(Problem("FILE_MALFORMED", "it is not text", where=str(path))) from error
 
 
-def _open_to_others(path: Path, status: os.stat_result) -> Problem:
+def _open_to_other_users(path: Path, status: os.stat_result) -> Problem:
     return Problem(
         "FILE_OPEN_TO_OTHERS",
         "other users could read or change this file, so it proves nothing any more",
         where=str(path),
         need="mode 0600, own user",
         have=f"mode {stat.S_IMODE(status.st_mode):04o}, user {status.st_uid}",
-        fix="make it anew, or, if nobody else has used this machine, `chmod 600` it",
+        fix="make a new one, or, if no one else has used this machine, `chmod 600` it",
     )
 
 

@@ -20,8 +20,8 @@ ANSWERED_S = 3.0
 """How long an answer is waited for: time in which this host's own loop stands still is none."""
 TICK_S = 0.1
 TRIES = 3
-"""As often a probe is sent anew whose connection has ended unanswered: ZeroMQ gives handshakes up
-by the clock, however little this process was let run meanwhile."""
+"""Probes that are sent while connections end unanswered: ZeroMQ gives handshakes up by the clock,
+however little this process could run meanwhile."""
 
 
 class Answer(Enum):
@@ -29,8 +29,8 @@ class Answer(Enum):
 
     TURNED_AWAY = "as it must be"
     LET_IN = "the handler was not asked, or lets all in"
-    ENDED = "it has ended before anybody answered"
-    NONE = "nobody answers"
+    ENDED = "it has ended before an answer"
+    NONE = "no answer comes"
 
 
 _KINDS: dict[int, Answer] = {
@@ -46,10 +46,10 @@ _KINDS: dict[int, Answer] = {
 async def prove_enforced(
     socket: zmq.Socket[bytes], keys: HostKeys | None, expect: Callable[[str], None]
 ) -> None:
-    """Dial a socket that is not bound yet, as somebody whom the handler must turn away.
+    """Dial a socket that is not bound yet, with a key that the handler must turn away.
 
-    `expect` tells the handler whom. Raises `PeerRefused` (ZAP_INEFFECTIVE) when the connection was
-    let in, or not answered: then the socket must not be bound.
+    `expect` tells the handler the key. Raises `PeerRefused` (ZAP_INEFFECTIVE) when the connection
+    was let in, or not answered: then the socket must not be bound.
     """
     socket.bind("tcp://127.0.0.1:*")
     address = socket.getsockopt(zmq.LAST_ENDPOINT)
@@ -65,7 +65,7 @@ async def prove_enforced(
         raise PeerRefused(
             Problem(
                 "ZAP_INEFFECTIVE",
-                "a key that must be turned away was let in, or nobody was asked about it: "
+                "a key that must be turned away was let in, or the key was not checked: "
                 "this host will not listen to peers",
                 fix="look for another ZeroMQ authenticator in this process",
             )

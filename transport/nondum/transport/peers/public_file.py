@@ -3,7 +3,7 @@
     nondum-host@1 PUBLIC-CURVE-KEY rover-1
     nondum-fleet@1 PUBLIC-ED25519-KEY survey
 
-Whoever takes one to be true has compared its fingerprint, or knows the hand that gave it.
+A person who accepts one has compared its fingerprint, or got the file from a person they trust.
 """
 
 from __future__ import annotations

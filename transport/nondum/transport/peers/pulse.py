@@ -24,12 +24,12 @@ def _nothing() -> None:
     return None
 
 
-def _unheard(_peer: PeerKey, _state: State) -> None: ...
+def _ignore(_peer: PeerKey, _state: State) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Pulse:
-    """Where pings get this host's state, and who is told of the peers'."""
+    """Callbacks of pings: `state` gives this host's state, `receive` takes in a peer's."""
 
     state: Callable[[], State | None] = _nothing
-    heard: Callable[[PeerKey, State], None] = _unheard
+    receive: Callable[[PeerKey, State], None] = _ignore

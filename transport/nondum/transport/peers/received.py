@@ -20,7 +20,7 @@ from nondum.transport.peers.messages import MAX_MESSAGE
 
 MOST_AHEAD = 4 * MAX_MESSAGE
 """Bytes that may have been read from a connection beyond the messages that were delivered: the
-handshake, the part that is being read, and room."""
+handshake, the part that is being read, and headroom."""
 SEALED = 33
 """Bytes that CURVE adds to a part."""
 _LONG = 256
@@ -51,7 +51,7 @@ class Received:
         return state.bytes_read
 
     def ahead(self, read: int) -> int:
-        """How many of so many bytes read belong to no message that was delivered."""
+        """How many of `read` bytes belong to no message that was delivered."""
         return read - self._delivered
 
     def yield_to(self, other: Received) -> None:

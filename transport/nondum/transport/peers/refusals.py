@@ -58,10 +58,10 @@ class Refusal:
 
 
 class Refusals:
-    """What was turned away since the start."""
+    """Connections that were turned away since the start."""
 
     def __init__(self, on_refusal: Callable[[Refusal], None]) -> None:
-        """`on_refusal` is told of each: of many at once, when many strangers knock."""
+        """`on_refusal` is called for each, or for many at once, when many strangers connect."""
         self._on_refusal = on_refusal
         self._counts: Counter[Reason] = Counter()
         self._latest: deque[Refusal] = deque(maxlen=LATEST)

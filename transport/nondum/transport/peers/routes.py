@@ -22,7 +22,7 @@ class AcceptedRoute:
     """Over the listening socket, by the routing id that ZeroMQ gave the connection."""
 
     receiver: Receiver
-    """Set by whoever made it, before anything is told."""
+    """Set by the maker of the route, before it is told anything."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class AcceptedRoute:
 
 
 class DialledRoute:
-    """Over a socket of its own."""
+    """Over a separate socket."""
 
     def __init__(
         self, make: Callable[[], zmq.Socket[bytes]], address: str, receiver: Receiver
@@ -80,7 +80,7 @@ class DialledRoute:
 
     @property
     def receiver(self) -> Receiver:
-        """What is told of it."""
+        """The receiver of its events."""
         return self._receiver
 
     def send(self, data: bytes) -> Sent:
@@ -139,4 +139,4 @@ def _why(event: SocketEvent) -> Problem | None:
             "the handshake broke off: another key than the one announced, or no keys at all",
             fix="look at `security` and the fingerprints on both hosts",
         )
-    return Problem("PEER_SILENT", "nobody answers there")
+    return Problem("PEER_SILENT", "no host answers there")

@@ -42,7 +42,7 @@ from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.trust import Admission
 
 ANSWERED = 8
-"""One in so many pings is answered, for the round trip's time: pings themselves go both ways."""
+"""Every eighth ping is answered, to measure the round trip: both hosts ping anyway."""
 
 log = logging.getLogger(__name__)
 
@@ -156,9 +156,9 @@ class Session:
                 if number % ANSWERED == 0:
                     link.tell(Pong(number))
                 if state is not None:
-                    self._pulse.heard(self.admission.key, state)
+                    self._pulse.receive(self.admission.key, state)
             case Pong(number):
-                link.heard_pong(number, self._loop.time())
+                link.pong_received(number, self._loop.time())
             case Ask() | Vouch():
                 pass  # of those who watch the peers
             case Failure(number, problems):
@@ -187,7 +187,7 @@ class Session:
             log.exception("a notice of %s could not be taken in", self.admission.name)
 
     def end(self, reason: Loss) -> list[IncomingCall]:
-        """The peer is lost: fail the calls to it; its errands that run on."""
+        """The peer is lost: fail the calls to it; its calls that run on here."""
         if self.missing is not None:
             self.missing.cancel()
         self.paced.close()

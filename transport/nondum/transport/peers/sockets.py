@@ -1,7 +1,7 @@
-"""The seam beneath a host's links: sockets in this process, or in one of their own.
+"""The interface beneath a host's links: sockets in this process, or in a separate one.
 
-On one side are connections and who may make them, on the other what peers say over them. `here.py`
-and `apart/` have the two kinds of sockets, `node.py` is their owner.
+On one side are connections and who may make them, on the other what peers say over them.
+`local_sockets.py` and `socket_process/` have the two kinds of sockets, `node.py` is their owner.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Accepted(Route, Protocol):
 
 
 class Receiver(Protocol):
-    """What is told of one connection, on the loop."""
+    """The receiver of the events of one connection, on the loop."""
 
     def connected(self) -> None:
         """The other end has proved its key. Not told of accepted ones: they begin so."""
@@ -52,7 +52,7 @@ class Owner:
     """The first message of another host's connection has come, and is told next. The key is the one
     that was proved, None in development mode."""
     on_refusal: Callable[[Refusal], None]
-    """Somebody was turned away, or cut before becoming a peer."""
+    """A host was turned away, or cut before it became a peer."""
     on_failed: Callable[[Problem], None]
     """All connections are over for a fault of the sockets' own; new ones will be made again."""
     awake_s: Callable[[], float]

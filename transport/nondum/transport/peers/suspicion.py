@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 V1_SILENCE_S, V1_BEATS, V1_LONGEST_S = 1.0, 3.3, 10.0
-"""Hosts of version 1 of the protocol give a link up after so long, or after so many beats."""
+"""Version 1 of the protocol gives a link up after this silence, or this number of beats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +126,8 @@ class Watched:
         """Whether it was asked and has not answered yet."""
         return self.suspected_s is not None
 
-    def heard(self, awake_s: float) -> Watched:
-        """Anything came from the peer itself: whatever was suspected is refuted."""
+    def received(self, awake_s: float) -> Watched:
+        """The peer itself sent something: any suspicion is refuted."""
         return Watched(awake_s)
 
     def vouched(self) -> Watched:

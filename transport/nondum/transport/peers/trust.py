@@ -42,7 +42,7 @@ class Admission:
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """Whom this host trusts. Every change makes a new value."""
+    """The keys that this host trusts. Every change makes a new value."""
 
     fleets: Mapping[FleetKey, str] = field(default_factory=dict)
     """Public key → what people call the fleet."""
@@ -52,7 +52,7 @@ class Trust:
     """Key → why."""
 
     def with_fleet(self, fleet: FleetKey, name: str) -> Trust:
-        """Let in whoever the fleet certifies."""
+        """Let in every host that the fleet certifies."""
         return replace(self, fleets={**self.fleets, fleet: name})
 
     def with_paired(self, key: PeerKey, name: str) -> Trust:
@@ -72,8 +72,8 @@ class Trust:
             _without(self.fleets, key), _without(self.paired, key), _without(self.revoked, key)
         )
 
-    def standing(self, key: PeerKey) -> TrustState:
-        """What is known of a key alone."""
+    def state_of(self, key: PeerKey) -> TrustState:
+        """The state of a key, without a certificate."""
         if key in self.revoked:
             return TrustState.REVOKED
         if key in self.paired:
@@ -85,7 +85,7 @@ class Trust:
 
         Raises `PeerRefused` (KEY_REVOKED, KEY_UNKNOWN, CERTIFICATE_…).
         """
-        match self.standing(key):
+        match self.state_of(key):
             case TrustState.REVOKED:
                 raise PeerRefused(self._revoked(key))
             case TrustState.ADMITTED:

@@ -20,7 +20,7 @@ _PARTS = ("fleets", "paired", "revoked")
 
 
 def load(path: Path) -> Trust:
-    """Read a trust file; none means nobody is trusted.
+    """Read a trust file; without one no key is trusted.
 
     Raises `PeerRefused` (FILE_OPEN_TO_OTHERS, FILE_MALFORMED, KEY_MALFORMED), `OSError`.
     """

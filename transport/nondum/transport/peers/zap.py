@@ -36,7 +36,7 @@ class Entry(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionAttempt:
-    """Somebody wants to connect."""
+    """A connection that another process wants to make."""
 
     address: str
     """Where from: an IP address."""
@@ -77,7 +77,7 @@ class ZapHandler:
                 socket.bind(ENDPOINT)
             except zmq.ZMQError as error:
                 raise PeerRefused(
-                    Problem("ZAP_TAKEN", "somebody else answers for this context's connections")
+                    Problem("ZAP_TAKEN", "another handler answers for this context's connections")
                 ) from error
             self._replies = Drained(socket, self._answer)
             taken.pop_all()
@@ -87,7 +87,7 @@ class ZapHandler:
         self._probes.add(key)
 
     def close(self) -> None:
-        """Answer no more: nobody is let in then."""
+        """Answer no more: no connection is let in then."""
         self._replies.close()
 
     def _answer(self, frames: list[zmq.Frame]) -> None:
@@ -95,15 +95,15 @@ class ZapHandler:
         number = parts[1] if len(parts) > 1 else b""
         key, entry = "", Entry.BROKEN
         try:
-            knock = parse(parts)
-            key, entry = knock.key, self._judged(knock)
+            attempt = parse(parts)
+            key, entry = attempt.key, self._judged(attempt)
         except Exception:  # whatever it is, everybody behind it would wait for ever
             log.exception("a connection could not be judged")
         user = key.encode("ascii") if entry is Entry.LET_IN else b""
         self._replies.send([b"1.0", number, entry.value, entry.name.encode("ascii"), user, b""])
 
-    def _judged(self, knock: ConnectionAttempt) -> Entry:
-        if knock.key in self._probes:
-            self._probes.discard(knock.key)
+    def _judged(self, attempt: ConnectionAttempt) -> Entry:
+        if attempt.key in self._probes:
+            self._probes.discard(attempt.key)
             return Entry.TURNED_AWAY
-        return self._judge(knock)
+        return self._judge(attempt)

@@ -78,7 +78,9 @@ class StreamBroker:
             raise errors[0]
 
     def half(self, wire: Wire, consumer: WorkerLink) -> Callable[[Connection], Awaitable[None]]:
-        """What gives the consuming worker one half of a connection, whoever has the other.
+        """A function that gives the consuming worker one half of a connection.
+
+        Any process may have the other half.
 
         The half stays the caller's to close. Raises `WorkerFailed` or `LinkClosed`.
         """

@@ -28,8 +28,8 @@ class Clocks:
     def __init__(self) -> None:
         self._bounds: _Bounds | None = None
 
-    def heard(self, sent_s: float, owner_s: float, now_s: float) -> None:
-        """A ping was answered; `owner_s` is the owner's clock, the others are the reader's."""
+    def pong_received(self, sent_s: float, owner_s: float, now_s: float) -> None:
+        """A ping was answered: `owner_s` is by the owner's clock, the others by the reader's."""
         newer = _Bounds(owner_s - now_s, owner_s - sent_s, now_s)
         older = self._bounds
         if older is None or newer.width_s(now_s) <= older.width_s(now_s):

@@ -46,7 +46,7 @@ class Exporter:
         self._arrivals = Arrivals(self.refusals.add, self._on_closed)
         self._zap: ZapHandler | None = None
         self._listener: Drained | None = None
-        self._ears: Watch | None = None
+        self._monitor: Watch | None = None
         self._beating: asyncio.TimerHandle | None = None
 
     async def start(self, interfaces: Sequence[str], port: int = 0) -> int:
@@ -59,11 +59,11 @@ class Exporter:
             socket = sockets.listening(self._context, self._keys)
             taken.callback(socket.close, 0)
             await prove_enforced(socket, self._keys, self._zap.expect_probe)
-            ears = Watch(socket, self._arrivals.on_event)
-            taken.callback(ears.close)
+            monitor = Watch(socket, self._arrivals.on_event)
+            taken.callback(monitor.close)
             port = sockets.bind(socket, interfaces, port)
             self._listener = Drained(socket, self._on_frames)
-            self._ears = ears
+            self._monitor = monitor
             taken.pop_all()
         self._beating = self._loop.call_later(BEAT_S, self._beat)
         return port
@@ -73,14 +73,14 @@ class Exporter:
         token: str,
         reader: PeerKey,
         kind: str,
-        on_room: Callable[[], None],
+        on_can_send: Callable[[], None],
         on_over: Callable[[Problem], None],
     ) -> Outgoing:
         """Let a reader have one stream of type `kind`, once (see `Outgoing`).
 
         The token must be new; it names the grant, and is no secret: the reader's key is proved.
         """
-        made = Outgoing(token, reader, kind, on_room, on_over)
+        made = Outgoing(token, reader, kind, on_can_send, on_over)
         self._grants[token] = made
         return made
 
@@ -91,19 +91,19 @@ class Exporter:
         self._grants.clear()
         if self._beating is not None:
             self._beating.cancel()
-        if self._ears is not None:
-            self._ears.close()
+        if self._monitor is not None:
+            self._monitor.close()
         if self._listener is not None:
             self._listener.close(int(LAST_WORDS_S * 1000))
         if self._zap is not None:
             self._zap.close()
 
-    def _judge(self, knock: ConnectionAttempt) -> Entry:
+    def _judge(self, attempt: ConnectionAttempt) -> Entry:
         is_awaited = any(
-            granted.reader == knock.key and granted.way is None and not granted.is_over
+            granted.reader == attempt.key and granted.way is None and not granted.is_over
             for granted in self._grants.values()
         )
-        is_proved = knock.domain == sockets.DOMAIN and knock.mechanism == "CURVE"
+        is_proved = attempt.domain == sockets.DOMAIN and attempt.mechanism == "CURVE"
         return Entry.LET_IN if is_proved and is_awaited else Entry.TURNED_AWAY
 
     def _on_frames(self, frames: list[zmq.Frame]) -> None:
@@ -115,7 +115,7 @@ class Exporter:
             message = packets.read_asked(data.bytes)
             if outgoing is None:
                 self._claim(routing_id, data, message)
-            elif problem := outgoing.heard(message, len(data)):
+            elif problem := outgoing.receive(message, len(data)):
                 outgoing.break_off(problem)
         except ProtocolViolation as violation:
             if outgoing is not None:

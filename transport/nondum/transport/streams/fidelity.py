@@ -2,8 +2,8 @@
 
 What a link can take is not known before it is tried: rates that are measured while little is sent
 say little, and other traffic comes and goes. So images are compressed as soon as too many had to
-be dropped for want of room, and tried as they are after a calm time, which is longer after each
-trial that failed.
+be dropped because the link was full, and tried as they are after a calm time, which is longer after
+each trial that failed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Fidelity:
         self._judge(now_s)
 
     def dropped(self, now_s: float) -> None:
-        """An image gave way to a newer one, for want of room on the link."""
+        """An image gave way to a newer one because the link was full."""
         self._dropped += 1
         self._judge(now_s)
 

@@ -86,7 +86,7 @@ class Incoming:
             self._loop.call_soon(self._lose, self._problem)
 
     def handled(self, seq: int) -> None:
-        """A frame was taken in: there is room for another one."""
+        """A frame was taken in: the owner may send another one."""
         self._window.handled(seq, self._loop.time(), _NEVER_SLOW_S)
         self._say(Handled(seq))
 
@@ -138,7 +138,7 @@ class Incoming:
             case Opened(kind) if not self._is_opened:
                 self._is_opened = True
                 self._on_opened(kind)
-            case Frame(seq) if self._is_opened and self._window.has_room:
+            case Frame(seq) if self._is_opened and self._window.can_send:
                 self._window.sent(seq, length, now_s)
                 if self.clocks.are_known:
                     self._on_frame(message)
@@ -146,7 +146,7 @@ class Incoming:
                     self._early.append(message)
             case Pong(at_s, clock_s) if self._pongs.take(1, now_s):
                 if at_s:
-                    self.clocks.heard(at_s, clock_s, now_s)
+                    self.clocks.pong_received(at_s, clock_s, now_s)
                     self._hand_on_early()
             case Over(problem):
                 self._lose(problem)

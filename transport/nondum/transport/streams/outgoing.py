@@ -46,10 +46,10 @@ class Outgoing:
         token: str,
         reader: PeerKey,
         kind: str,
-        on_room: Callable[[], None],
+        on_can_send: Callable[[], None],
         on_over: Callable[[Problem], None],
     ) -> None:
-        """`on_room` is called when a message may be sent that could not before.
+        """`on_can_send` is called when a message may be sent that could not before.
 
         `on_over` is called once when the reader is gone, not after `end`.
         """
@@ -57,7 +57,7 @@ class Outgoing:
         self.frames_sent = 0
         self.bytes_sent = 0
         """Of headers and bulk, before they are sealed."""
-        self._on_room, self._on_over = on_room, on_over
+        self._on_can_send, self._on_over = on_can_send, on_over
         self._loop = asyncio.get_running_loop()
         self._heard_s = self._loop.time()
         self._heard_bytes = 0
@@ -72,16 +72,16 @@ class Outgoing:
         return self._way
 
     @property
-    def has_room(self) -> bool:
+    def can_send(self) -> bool:
         """Whether a message may be sent now."""
-        return self._way is not None and not self.is_over and self._window.has_room
+        return self._way is not None and not self.is_over and self._window.can_send
 
     def send(self, coding: Coding, header: Mapping[str, Any], bulk: Buffer | None) -> None:
-        """Send a message, for which there must be room; `bulk` is read until it has left.
+        """Send a message; `can_send` must hold. `bulk` is read until it has left.
 
         Raises `ProtocolViolation` for a header that fits no packet.
         """
-        assert self._way is not None, "there is room only once it is claimed"
+        assert self._way is not None, "nothing can be sent before the grant is claimed"
         self.frames_sent += 1
         frame = packets.Frame(self.frames_sent, coding, header, bulk)
         parts: list[bytes | zmq.Frame] = [packets.head(frame)]
@@ -102,10 +102,10 @@ class Outgoing:
         """The reader is there."""
         self._way, self._heard_s = way, self._loop.time()
         way.send([packets.told(packets.Opened(self.kind))])
-        self._on_room()
+        self._on_can_send()
 
-    def heard(self, message: Asked, length: int) -> Problem | None:
-        """Take in what the reader says; what is wrong with it."""
+    def receive(self, message: Asked, length: int) -> Problem | None:
+        """Take in a message of the reader; the problem with it, if there is one."""
         now_s = self._loop.time()
         self._heard_s = now_s
         self._heard_bytes += length
@@ -116,10 +116,10 @@ class Outgoing:
                 round_trip_s = 0.0 if state is None else state.round_trip_s
                 if not self._window.handled(seq, now_s, round_trip_s):
                     return Problem("BRIDGE_PACKET", f"frame {seq} is not the next to be handled")
-                if self._window.has_room:
-                    self._on_room()
+                if self._window.can_send:
+                    self._on_can_send()
             case Ping() if not self._pings.take(1, now_s):
-                return Problem("BRIDGE_PACKET", "more signs of life than anybody needs")
+                return Problem("BRIDGE_PACKET", "more signs of life than are needed")
             case Ping(at_s):
                 if self._way.send([packets.told(Pong(at_s, self._loop.time()))]) is Sent.GONE:
                     self.break_off(_gone())
@@ -134,7 +134,9 @@ class Outgoing:
         quiet_s = self._loop.time() - self._heard_s
         if self._way is None:
             if quiet_s > CLAIM_S:
-                self.break_off(Problem("STREAM_UNCLAIMED", f"nobody came for it in {CLAIM_S:g} s"))
+                self.break_off(
+                    Problem("STREAM_UNCLAIMED", f"no reader claimed it within {CLAIM_S:g} s")
+                )
             return
         state = tcp.state(self._way.descriptor)
         received = 0 if state is None else state.bytes_received

@@ -52,7 +52,7 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Handled:
-    """A frame was taken in: there is room for another one."""
+    """A frame was taken in: another one may be sent."""
 
     seq: int
 

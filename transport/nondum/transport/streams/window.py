@@ -39,7 +39,7 @@ class Window:
         self._is_slow = False
 
     @property
-    def has_room(self) -> bool:
+    def can_send(self) -> bool:
         """Whether one more message may be sent now."""
         count = len(self._sent)
         if self._bytes <= SMALL_BYTES and count < SMALL_MESSAGES:

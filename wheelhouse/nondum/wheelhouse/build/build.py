@@ -88,7 +88,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
 
 
 def _made(package: Path, work: Path, options: Options) -> list[Path]:
-    """The wheels of the package and of its libraries, each in a folder of its own."""
+    """The wheels of the package and of its libraries, each in a separate folder."""
     libraries = [
         partial(library_wheel, library, work / str(number), options.sources)
         for number, library in enumerate(options.libraries)

@@ -1,7 +1,7 @@
 """Wheels for a payload, made and fetched by pip.
 
-pip runs as a process of its own from this interpreter, with the index and caches that its user has
-configured. What it chose is read from the wheels that it leaves.
+pip runs as a separate process of this interpreter, with the index and caches that its user has
+configured. What it chose is read from the wheels that it writes.
 """
 
 from __future__ import annotations
@@ -88,17 +88,17 @@ def _pip(arguments: Sequence[str], code: str, where: str, *, offline: bool) -> N
         problem = Problem(code, f"pip took longer than {TIMEOUT_S} s", where=where)
         raise InstallFailed(problem) from error
     if done.returncode:
-        line = telling_line(done.stderr)
+        line = error_line(done.stderr)
         fix = ADD_IT if offline and line.startswith(_ABSENT) else ""
         raise InstallFailed(Problem(code, line, where=where, fix=fix))
 
 
-def telling_line(said: str) -> str:
+def error_line(said: str) -> str:
     """The line of pip's errors that says most: what a build raised, else its own first error.
 
-    >>> telling_line("ERROR: No matching distribution found for x\\n")
+    >>> error_line("ERROR: No matching distribution found for x\\n")
     'No matching distribution found for x'
-    >>> telling_line("  error: exit code 1\\n      OSError: Readme is missing\\nnote: not pip\\n")
+    >>> error_line("  error: exit code 1\\n      OSError: Readme is missing\\nnote: not pip\\n")
     'OSError: Readme is missing'
     """
     lines = [line.strip() for line in said.splitlines() if line.strip()]

@@ -23,7 +23,7 @@ ENTRY_POINT_GROUP = "nondum.plugins"
 PROJECT = "pyproject.toml"
 
 Judge = Callable[[Index], Sequence[Problem]]
-"""What is wrong with what the plugins say to planning, which nobody here can tell."""
+"""Finds mistakes in the plugins' PDDL; given from outside, as this package cannot parse PDDL."""
 
 
 def manifest_of(package: Path) -> Manifest:

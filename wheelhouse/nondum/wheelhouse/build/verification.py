@@ -1,7 +1,7 @@
 """Everything wrong with a payload folder, by the functions that hosts judge drives with.
 
-A host stops at the first step that fails, since it goes on with nothing that it may not believe;
-whoever asks here wants to know everything, so what can still be judged is.
+A host stops at the first step that fails, since it goes on with nothing that it may not believe.
+Here the caller wants all problems, so every step that is still possible is done.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A file whose bytes nobody changes, read by position (pread(2)) instead of being mapped.
+"""A file whose bytes never change, read by position (pread(2)) instead of being mapped.
 
 A mapping takes address space for as long as it is there, as much as the file is long: a process
 that is held to 2 GiB of it could not open several large wheels, nor a larger one.

@@ -1,4 +1,4 @@
-"""`goal.txt`: what a payload wants, in words, from when it is in force until it is withdrawn.
+"""`goal.txt`: the goals of a payload, in words, while the payload is active.
 
 A goal a line; empty lines, and those that begin with `#`, are passed over.
 """
@@ -56,7 +56,7 @@ def _line_problems(line: str, where: str) -> Iterator[Problem]:
 
 
 def to_bytes(goals: Iterable[str]) -> bytes:
-    """Goals as they stand in the file. Raises `PayloadRefused`, as whoever reads it would."""
+    """Goals as they stand in the file. Raises `PayloadRefused`, as `parse` does."""
     data = "".join(f"{goal.strip()}\n" for goal in goals).encode()
     parse(data, NAME)
     return data

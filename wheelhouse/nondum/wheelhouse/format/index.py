@@ -26,8 +26,8 @@ def parse(data: bytes, where: str) -> Index:
     try:
         document = json.loads(data)
         json.dumps(document, ensure_ascii=False).encode()
-    except UnicodeEncodeError as error:  # JSON can say it, and nobody could keep or tell it
-        text = f"has half a letter in it: {error.object[error.start : error.end]!r}"
+    except UnicodeEncodeError as error:  # JSON can express it, UTF-8 cannot
+        text = f"has an unpaired surrogate in it: {error.object[error.start : error.end]!r}"
         raise _refused("INDEX_INVALID", text, where) from error
     except (ValueError, RecursionError) as error:
         raise _refused("INDEX_INVALID", f"is not JSON: {error}", where) from error

@@ -45,7 +45,7 @@ class Grant:
         asked = [(c.id, permission) for c in manifest.components for permission in c.permissions]
         if goals:
             asked.append((goal_file.NAME, GOALS))
-        by = f"the role {self.role}" if self.role else "whoever signed it"
+        by = f"the role {self.role}" if self.role else "its signer"
         return tuple(
             Problem(
                 "PERMISSION_DENIED",
@@ -61,10 +61,10 @@ class Grant:
 
 
 NOTHING = Grant()
-"""What is granted where nobody is believed."""
+"""What is granted where no signer is trusted."""
 
 EVERYTHING = Grant(GRANTABLE)
-"""What is granted where nobody asks for signatures."""
+"""What is granted where no signatures are demanded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +72,8 @@ class Verdict:
     """Whether a contents list may be believed, in whose name, and what for."""
 
     signers: tuple[str, ...]
-    """Names (fingerprints of those without) of keys whose signatures hold; empty: nobody vouches
-    for it."""
+    """Names (fingerprints of those without) of keys whose signatures hold; empty: no key signed
+    it."""
     problems: tuple[Problem, ...] = ()
     """Why it is refused; empty: it is not."""
     warnings: tuple[Problem, ...] = ()
@@ -94,7 +94,7 @@ class UnsignedAllowed:
     """Believes everything: for development, where `allow_unsigned` is set."""
 
     warning = "payloads without a signature are accepted (allow_unsigned)"
-    """What every status must say while this is in force."""
+    """What every status must say while this verifier is used."""
 
     def verify(self, contents: bytes, signature: bytes | None) -> Verdict:
         """Accept."""

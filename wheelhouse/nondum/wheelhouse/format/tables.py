@@ -172,7 +172,7 @@ class Table:
         return value
 
     def table(self, key: str) -> Table:
-        """A table of its own; empty when it is left out."""
+        """The table under a key; empty when it is left out."""
         return Table(self._dict(key), self._report, self._full(key))
 
     def tables(self, key: str, *, required: bool = False) -> Sequence[Table]:
@@ -191,7 +191,7 @@ class Table:
         self._report.add("VALUE", f"{name}: {message}", self._line(key), fix)
 
     def close(self) -> None:
-        """Tell every key that nobody took."""
+        """Report every key that was not read."""
         for key in self._data:
             if key in self._taken:
                 continue

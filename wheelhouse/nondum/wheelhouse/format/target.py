@@ -46,7 +46,7 @@ class Target:
 
 
 def targets(architectures: tuple[str, ...], pythons: tuple[str, ...]) -> tuple[Target, ...]:
-    """Every pairing. Raises `ConfigRefused` (TARGET_UNKNOWN) for what nobody builds wheels for."""
+    """Every pairing. Raises `ConfigRefused` (TARGET_UNKNOWN) for those that have no wheels."""
     problems = [
         Problem("TARGET_UNKNOWN", f"{a!r} is no architecture", need=" or ".join(ARCHITECTURES))
         for a in architectures

@@ -294,7 +294,7 @@ def _gone(folder: Path, error: OSError) -> DriveGone | PayloadRefused:
     """What is told of a drive of which something cannot be read."""
     if error.errno in _DAMAGED | _CLOSED:
         what = "its file system is damaged" if error.errno in _DAMAGED else "it cannot be read"
-        fix = "check the drive on another computer, or format it and copy the payload anew"
+        fix = "check the drive on another computer, or format it and copy the payload again"
         text = f"{what} ({error.strerror})"
         return PayloadRefused(Problem("FS_ERROR", text, where=str(folder), fix=fix))
     why = "was pulled" if error.errno in _GONE or not folder.exists() else "cannot be read"

@@ -1,7 +1,7 @@
 """Whether the memory is there that a payload asks for: free, and not promised to another one.
 
-What a payload was promised and does not use yet looks free. Of its own memory it is known what a
-worker uses; of GPU memory only what all use together.
+What a payload was promised and does not use yet looks free. How much main memory each worker uses
+is known; of GPU memory only what all workers use together.
 """
 
 from __future__ import annotations

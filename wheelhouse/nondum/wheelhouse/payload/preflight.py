@@ -35,7 +35,7 @@ from nondum.wheelhouse.wheels import wheel
 from nondum.wheelhouse.wheels.wheel import Layout
 
 GROWTH = 4
-"""Unpacked wheels are at most about so many times their size; measured: 2.8 to 2.9."""
+"""Unpacked wheels have at most about this multiple of their size; measured: 2.8 to 2.9."""
 _MB = 1024 * 1024
 _PLENTY_MB = 2**40
 

@@ -1,8 +1,8 @@
 """Modules compiled ahead of time, for interpreters that may not write: PEP 3147, PEP 552.
 
-Hash-based and unchecked: interpreters take them for what they are, since whoever links them has
-hashed them. Compiling runs none of the code, but the compiler reads what strangers wrote: do it in
-a process that may die.
+Hash-based and unchecked: interpreters do not compare them with their sources, since the host has
+hashed both before it links them. Compiling runs none of the code, but the compiler reads what
+strangers wrote: do it in a process that may die.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TAG = sys.implementation.cache_tag or ""
 
 FOLDER = "__pycache__"
 _UNCHECKED_HASH = (0b01).to_bytes(4, "little")
-"""Flags of PEP 552: there is a hash of the source, and nobody need look at it."""
+"""Flags of PEP 552: there is a hash of the source, and the interpreter need not check it."""
 _UNCOMPILABLE = (SyntaxError, ValueError, ArithmeticError, RuntimeError, SystemError, MemoryError)
 """What the compiler raises: templates, other versions' syntax, null bytes, too deep nesting."""
 
@@ -70,7 +70,7 @@ def write(
     done = []
     for file in _modules(files):
         source = (root / file.path).read_bytes()
-        # The very bytes that were hashed are compiled: files may be changed by whoever uses them.
+        # The very bytes that were hashed are compiled: other processes may change the file.
         is_known = hashlib.sha256(source).hexdigest() == file.sha256
         data = compiled(source, file.path) if is_known else None
         if data is not None:

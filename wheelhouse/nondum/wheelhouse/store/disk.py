@@ -102,25 +102,25 @@ def is_short_of_memory(error: Exception) -> bool:
 
 
 def _full(what: str, where: Path) -> Problem:
-    have, is_out_of_files = _room(where)
+    have, is_out_of_files = _free_space(where)
     return Problem(
         "DISK_FULL",
-        f"{what}: {'no room for more files' if is_out_of_files else 'the disk is full'}",
+        f"{what}: {'the disk has no free inodes' if is_out_of_files else 'the disk is full'}",
         where=str(where),
-        need="a free inode for each file" if is_out_of_files else "room for all of it",
+        need="a free inode for each file" if is_out_of_files else "enough free space",
         have=have,
         fix="pull a payload, free some disk, or lower `quota_mb` under [install]",
     )
 
 
-def _room(where: Path) -> tuple[str, bool]:
-    """What is left, in words, and whether it is files that there is no room for."""
+def _free_space(where: Path) -> tuple[str, bool]:
+    """Free inodes or megabytes, in words, and whether the inodes are what is used up."""
     there = next((path for path in (where, *where.parents) if path.exists()), Path("/"))
     try:
-        room = os.statvfs(there)
+        free = os.statvfs(there)
     except OSError:
         return "unknown", False
     # Some file systems have no fixed number of inodes, and say zero of zero.
-    if room.f_files and not room.f_favail:
-        return f"none free of {room.f_files} inodes", True
-    return f"{room.f_bavail * room.f_frsize // 1024**2} MB free", False
+    if free.f_files and not free.f_favail:
+        return f"none free of {free.f_files} inodes", True
+    return f"{free.f_bavail * free.f_frsize // 1024**2} MB free", False

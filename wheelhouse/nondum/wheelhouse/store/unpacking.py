@@ -64,7 +64,7 @@ class Unpacked:
 
 
 def unpack(sources: Sequence[Source], progress: Progress | None = None) -> tuple[Unpacked, ...]:
-    """Unpack wheels whose files nobody else can change. Nothing is synced.
+    """Unpack wheels whose files no other process can change. Nothing is synced.
 
     Raises `PayloadRefused` (HASH_MISMATCH, WHEEL_…) and `OSError`; what was written by then is
     left to the caller.
@@ -148,7 +148,7 @@ class _Counter:
             self._total = total
 
     def add(self, size: int) -> None:
-        """Count so many bytes, perhaps none, and tell of it."""
+        """Count `size` bytes, perhaps 0, and report the progress."""
         if self._progress is None:
             return
         with self._lock:

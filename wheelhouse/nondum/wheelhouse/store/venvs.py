@@ -51,7 +51,7 @@ def make(venv: Path, python: Path, wheels: Sequence[StoredWheel]) -> None:
 
 
 def add_compiled(venv: Path, wheels: Sequence[StoredWheel]) -> None:
-    """Link what was compiled since a venv was made, each file whole, whoever runs it meanwhile.
+    """Link what was compiled since a venv was made; processes that run in it see whole files only.
 
     Raises `InstallFailed` (DISK_FULL, IO_ERROR).
     """

@@ -38,7 +38,7 @@ def begun(
 
 
 def allowed(trust: Trust, key: TrustedKey, role: Role) -> Trust:
-    """Let a key bring payloads: in a role of its own, or beside others in one that is there.
+    """Let a key bring payloads: in a new role, or beside other keys in an existing one.
 
     Raises `TrustRefused` (KEY_TAKEN, KEY_REVOKED).
     """

@@ -41,7 +41,7 @@ def judge(
 ) -> Verdict:
     """Judge the bytes of a contents list by those of its signature file (None: there is none).
 
-    `trust` is None where nobody is trusted. Never raises.
+    `trust` is None on a host without a trust file. Never raises.
     """
     try:
         signatures = _signatures(contents, signature)
@@ -142,7 +142,7 @@ def _signatures(contents: bytes, signature: bytes | None) -> Sequence[Signature]
                     "SIG_INVALID",
                     f"the signature of {one.key.fingerprint} does not fit the contents list",
                     where=lists.SIGNATURE_NAME,
-                    fix="the list was changed after it was signed: get the payload anew",
+                    fix="the list was changed after it was signed: get the payload again",
                 )
             )
     return found
@@ -167,7 +167,7 @@ def _doubt(trust: Trust, key: PublicKey, now: datetime | None) -> _Doubt:
 
 
 def _untrusted(trust: Trust | None, key: PublicKey) -> Problem:
-    by = "this host trusts nobody yet" if trust is None else f"{trust.owner} does not trust the key"
+    by = "this host trusts no key yet" if trust is None else f"{trust.owner} does not trust the key"
     fix = (
         "`nondum keys trust FILE` with its owner's trust file"
         if trust is None
@@ -217,7 +217,7 @@ def _refusal(owners: Sequence[Role], believed: Sequence[TrustedKey], listed: Con
     names, where = {known.name for known in believed}, listed.payload_id
     who = ", ".join(sorted(names))
     if not owners:
-        told = "nobody may bring a payload of this id"
+        told = "no role may bring a payload of this id"
         fix = f"add it to a role of {who} in the trust file"
         return Problem("ID_NOT_ALLOWED", told, where, have=f"signed by {who}", fix=fix)
     signed = max(owners, key=lambda role: len(names & set(role.keys)))

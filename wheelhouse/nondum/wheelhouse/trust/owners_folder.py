@@ -82,7 +82,7 @@ def sign(path: Path, key: Path) -> Trust:
 
 
 def still_missing(path: Path) -> tuple[str, ...]:
-    """Who else must sign, a sentence for each set of roots that has not; empty: nobody."""
+    """The signatures that are missing, a sentence for each set of roots; empty: none."""
     file = read(path)
     trust = trust_file.parse_bytes(file.data, str(path))
     points = succession.signers(file) if file.signature is not None else frozenset()
@@ -110,7 +110,7 @@ def sign_payload(folder: Path, key: Path) -> tuple[str, ...]:
     path = folder / contents.SIGNATURE_NAME
     before = path.read_bytes() if path.exists() else None
     if before is not None and not all(s.holds(data) for s in sshsig.parse(before, str(path))):
-        before = None  # the payload was built anew
+        before = None  # the payload was built again
     made = signing.added(before, signing.sign(data, key, sshsig.PAYLOAD), str(path))
     disk.write(path, made)
     return tuple(one.key.fingerprint for one in sshsig.parse(made, str(path)))

@@ -58,7 +58,7 @@ def parse_public(text: str, where: str) -> PublicKey:
 
 
 def sign(data: bytes, key: Path, namespace: str) -> bytes:
-    """The signature of data, in a form of its own file. With a `.pub`, the agent signs.
+    """The signature of data, in the form of a signature file. With a `.pub`, the agent signs.
 
     Raises `TrustRefused` (SSH_KEYGEN, KEY_MALFORMED), `OSError`.
     """
@@ -72,7 +72,7 @@ def sign(data: bytes, key: Path, namespace: str) -> bytes:
 
 
 def added(signatures: bytes | None, new: bytes, where: str) -> bytes:
-    """A signature file with one more signature; an earlier one of the same key makes room.
+    """A signature file with one more signature; it replaces an earlier one of the same key.
 
     Raises `PayloadRefused` (SIG_MALFORMED …) where the file is none.
     """

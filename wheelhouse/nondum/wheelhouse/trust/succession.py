@@ -1,8 +1,8 @@
 """Which trust file may follow which: version N+1 after N, signed by the roots of both.
 
-As TUF has it for its root (theupdateframework/specification, section 5.3): the roots in force sign,
-so that nobody else can change them; the new ones sign too, so that none is named who could not go
-on. A file is parsed once enough roots in force have signed it, not before.
+As TUF has it for its root (theupdateframework/specification, section 5.3): the current roots sign,
+so that no one else can change them; the new ones sign too, which proves that their keys work and
+can sign the next version. A file is parsed once enough current roots have signed it, not before.
 
 A chain begins with a file that its own roots have signed: a person who compares their fingerprints
 has then seen to everything in it. What root has written to the host's own disk needs no signature.
@@ -31,7 +31,7 @@ _PLACED = (
 
 @dataclass(frozen=True, slots=True)
 class SignedFile:
-    """A trust file and its signatures, as bytes that nobody has parsed."""
+    """A trust file and its signatures, as bytes that are not parsed yet."""
 
     data: bytes
     signature: bytes | None
@@ -45,7 +45,7 @@ class SignedFile:
 
 @dataclass(frozen=True, slots=True)
 class Extended:
-    """What became of the trust in force when files were offered."""
+    """The current trust after files were offered, and which of them were accepted."""
 
     trust: Trust
     accepted: tuple[SignedFile, ...] = ()
@@ -76,7 +76,7 @@ def extend(trust: Trust, known: Sequence[str], offered: Sequence[SignedFile]) ->
 
 
 def successor(trust: Trust, file: SignedFile) -> Trust:
-    """The trust that a file brings into force after another.
+    """The trust that a file sets when it follows `trust`.
 
     Raises `TrustRefused` (TRUST_SIGNATURE, TRUST_OWNER, TRUST_VERSION, TRUST_…), `PayloadRefused`
     (SIG_MALFORMED, SIG_WRONG_PURPOSE).
@@ -89,7 +89,7 @@ def successor(trust: Trust, file: SignedFile) -> Trust:
     if new.version != trust.version + 1:
         raise _out_of_order(trust, new, file)
     if new.made < trust.made:
-        told, fix = "it was made before the one in force", "write the date into `made` anew"
+        told, fix = "it was made before the active one", "write the current date into `made`"
         need, have = f"{trust.made:%F %T} or later", f"{new.made:%F %T}"
         raise _refused("TRUST_VERSION", told, file, need, have, fix)
     _check_signed(new.roots, f"version {new.version}", file)
@@ -126,7 +126,7 @@ def signers(file: SignedFile) -> frozenset[bytes]:
     Raises `TrustRefused` (TRUST_SIGNATURE), `PayloadRefused` (SIG_MALFORMED, SIG_WRONG_PURPOSE).
     """
     if file.signature is None:
-        raise _refused("TRUST_SIGNATURE", "nobody has signed it", file, "", "", _SIGN)
+        raise _refused("TRUST_SIGNATURE", "it is not signed", file, "", "", _SIGN)
     where, points = f"{file.where}.sig", set()
     for one in sshsig.parse(file.signature, where):
         if one.namespace != sshsig.TRUST:
@@ -135,7 +135,7 @@ def signers(file: SignedFile) -> frozenset[bytes]:
             raise PayloadRefused(Problem("SIG_WRONG_PURPOSE", told, where, need, have, _SIGN))
         if not one.holds(file.data):
             told = f"the signature of {one.key.fingerprint} does not fit it"
-            fix = "it was changed after it was signed: get it anew, or sign it again"
+            fix = "it was changed after it was signed: get it again, or sign it again"
             raise _refused("TRUST_SIGNATURE", told, file, "", "", fix)
         points.add(one.key.point)
     return frozenset(points)
@@ -154,11 +154,11 @@ def _check_signed(roots: Roots, whose: str, file: SignedFile) -> None:
 def _out_of_order(trust: Trust, new: Trust, file: SignedFile) -> TrustRefused:
     need, have = f"version {trust.version + 1}", f"version {new.version}"
     if new.version == trust.version:
-        told = "its roots have signed another trust file of the version that is in force"
+        told = "its roots have signed another trust file of the same version as the active one"
         fix = "find out which is genuine: somebody may have the keys of the roots"
         return _refused("TRUST_CONFLICT", told, file, need, have, fix)
     if new.version < trust.version:
-        told, fix = "an older trust file than the one in force", "bring the newest one"
+        told, fix = "an older trust file than the active one", "bring the newest one"
     else:
         told, fix = "versions are missing between", "bring those in between, too"
     return _refused("TRUST_VERSION", told, file, need, have, fix)

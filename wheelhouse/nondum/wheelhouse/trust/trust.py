@@ -1,4 +1,4 @@
-"""Whom a robot's owner trusts with what: the values of a trust file."""
+"""The keys that a robot's owner trusts, and for what: the values of a trust file."""
 
 from __future__ import annotations
 

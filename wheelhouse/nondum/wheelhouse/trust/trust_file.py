@@ -1,4 +1,4 @@
-"""`trust.toml`: whom a robot's owner trusts, as people write it and read it.
+"""`trust.toml`: the keys that a robot's owner trusts, as people write it and read it.
 
 format = "nondum-trust 1"
 owner = "survey"
@@ -69,7 +69,7 @@ def parse(text: str, where: str) -> Trust:
     try:
         return _parse(text, where)
     except PayloadRefused as refused:
-        fix = "correct it there, and have the roots sign it anew: `nondum keys sign FILE`"
+        fix = "correct it there, and have the roots sign it again: `nondum keys sign FILE`"
         told = (replace(problem, fix=problem.fix or fix) for problem in refused.problems)
         raise TrustRefused(*told) from refused
 

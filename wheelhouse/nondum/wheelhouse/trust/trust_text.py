@@ -16,8 +16,8 @@ def to_text(trust: Trust) -> str:
 
 
 def _lines(trust: Trust) -> Iterator[str]:
-    yield "# Whom the robots of this owner trust. After a change: version + 1, and signed anew by"
-    yield "# the roots (`nondum keys sign`). See docs/trust.md."
+    yield "# The keys that the robots of this owner trust. After a change, add 1 to `version`, and"
+    yield "# have the roots sign the file again (`nondum keys sign`). See docs/trust.md."
     yield f"format = {_text(FORMAT)}"
     yield f"owner = {_text(trust.owner)}"
     yield f"version = {trust.version}"

@@ -17,7 +17,7 @@ class Reader:
         self._data = data
 
     def take(self, count: int) -> bytes:
-        """So many bytes."""
+        """The next `count` bytes."""
         if len(self._data) < count:
             raise Malformed("it is cut off")
         taken, self._data = self._data[:count], self._data[count:]

@@ -26,9 +26,9 @@ from nondum.wheelhouse.wheels.inflate import HEAD_FEED, beginning, crc32, inflat
 MAX_MEMBERS = 20_000
 MAX_TOTAL_BYTES = MAX_FILE_BYTES
 MAX_RATIO = 1000
-"""A member may unpack to so many times its packed size; deflate can do no more than 1032."""
+"""How many times its packed size a member may unpack to; deflate can do no more than 1032."""
 MAX_WHOLE_RATIO = 100
-"""And a wheel to so many times its own size: of 430 widely used ones, none reaches 11."""
+"""How many times its own size a wheel may unpack to: of 430 widely used ones, none reaches 11."""
 RATIO_COUNTS_ABOVE = 16 * 1024**2
 """Bytes: test data of a few megabytes of zeros is in honest wheels."""
 MAX_NAME = 255

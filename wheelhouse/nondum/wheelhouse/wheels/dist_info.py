@@ -93,7 +93,7 @@ class Needs:
 def folder(paths: Sequence[str], named: WheelName) -> str:
     """The one `.dist-info` folder. Raises `ValueError` when it is missing, or another is there.
 
-    Vendored ones, deeper down, are nobody's business.
+    Vendored ones, deeper down, do not count.
     """
     tops = {PurePosixPath(path).parts[0] for path in paths}
     found = sorted(top for top in tops if top.endswith((".dist-info", ".egg-info", ".egg-link")))
@@ -114,7 +114,7 @@ def metadata_flaws(text: str, named: WheelName) -> Iterator[str]:
     said = _parsed(headers)
     names, versions = said.get_all("Name", []), said.get_all("Version", [])
     if [canonicalize_name(str(name)) for name in names] != [named.name]:
-        yield f"METADATA is of {', '.join(map(str, names))[:80] or 'nobody'!r}, not {named.name!r}"
+        yield f"METADATA is of {', '.join(map(str, names))[:80] or 'no name'!r}, not {named.name!r}"
     if len(versions) != 1 or not _is(str(versions[0]), named.version):
         told = ", ".join(map(str, versions))[:80]
         yield f"METADATA is of version {told!r}, not {named.version}"
@@ -138,7 +138,7 @@ def _needs(said: Message) -> Needs:
 
 
 def _headers_of(text: str) -> str:
-    """What stands before the first empty line; nobody takes what follows for headers."""
+    """The text before the first empty line; no reader takes what follows for headers."""
     end = _END_OF_HEADERS.search(text)
     return text[: end.start() + 1] if end else text
 

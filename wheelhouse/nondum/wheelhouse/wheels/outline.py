@@ -203,7 +203,7 @@ def _member_flaws(data: Bytes, info: zipfile.ZipInfo, entry: _Central) -> Iterat
     try:
         local = _local(data, info.header_offset)
     except (struct.error, ValueError):
-        yield "has no header of its own where the directory says"
+        yield "has no local header where the directory says"
         return
     if local.start + info.compress_size > len(data):
         yield "lies outside the file"

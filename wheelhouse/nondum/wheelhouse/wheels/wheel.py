@@ -54,7 +54,7 @@ class Layout:
 
 
 def opened(path: Path) -> FixedFile:
-    """A wheel's bytes; close it. Only for files that nobody else can change. Raises `OSError`."""
+    """A wheel's bytes; close it. Only for files that no one else can change. Raises `OSError`."""
     return FixedFile(path)
 
 
@@ -104,7 +104,7 @@ def hook_problems(
     """Start-up hooks among what is left out of a wheel, but for those that the manifest names.
 
     None is ever installed, since workers run no hooks; but a wheel that counts on one would not
-    work, and one that nobody expects is most often an attack.
+    work, and an unexpected one is most often an attack.
     """
     hooks = [target for path in left_out if _is_hook(target := _target(path) or "")]
     return tuple(

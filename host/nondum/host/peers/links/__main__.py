@@ -19,7 +19,7 @@ from nondum.host.sandbox.levels import host_children
 from nondum.transport.peers.socket_process.service import Service
 
 FAILED = 70
-"""Exit status after a failure of its own (sysexits.h, EX_SOFTWARE)."""
+"""Exit status after an internal failure (sysexits.h, EX_SOFTWARE)."""
 
 
 def main(pipe: int, daemon: int, memory: int) -> int:

@@ -46,7 +46,7 @@ class Case:
     declined: dict[str, Declined] = field(default_factory=dict)
     """By host."""
     told: tuple[Problem, ...] = ()
-    """What people were told last of nobody's taking it."""
+    """The problems that people were told last, why no peer takes it."""
     task: asyncio.Task[None] | None = None
 
     @property

@@ -92,7 +92,7 @@ def parcels(state: HostState, pins: Mapping[str, str]) -> dict[str, Parcel]:
     for payload in state.payloads.values():
         pinned_to = pins.get(payload.payload_id, "")
         source = movable_source(payload, state)
-        if source is not None and _is_for_others(payload, pinned_to):
+        if source is not None and _may_run_elsewhere(payload, pinned_to):
             drive, folder = source
             found[payload.key] = Parcel(
                 key=payload.key,
@@ -142,7 +142,7 @@ def ranked(candidates: Iterable[Candidate], parcel: Parcel, here: Compute) -> tu
     return tuple(sorted((c for c in wanted if parcel.pinned_to in ("", c.host)), key=rank))
 
 
-def _is_for_others(payload: PayloadRecord, pinned_to: str) -> bool:
+def _may_run_elsewhere(payload: PayloadRecord, pinned_to: str) -> bool:
     if payload.step is Step.REFUSED:
         codes = {problem.code for problem in payload.problems}
         may_fit = OTHERS_MAY_FIT | ({ELSEWHERE} if pinned_to else set())

@@ -12,7 +12,7 @@ LARGEST = 64 * 1024
 LEAST = 16 * 1024
 MOST = 1024 * 1024
 PIECES = 4
-"""A window is so many pieces at least."""
+"""The least number of pieces in a window."""
 WAIT_S = 0.1
 """What others may be kept waiting."""
 

@@ -46,7 +46,7 @@ from nondum.transport.fleet.fleet import Fleet
 from nondum.transport.peers import CallFailed, IncomingCall, PeerKey, PeerUnreachable
 
 TAKE_S = 30 * 86400.0
-"""Deadline of the call that lasts as long as the payload is there; then it is made anew."""
+"""Deadline of the call that lasts as long as the payload is there; then it is made again."""
 _ENDED = frozenset({"DEADLINE", "HALTED"})
 """How calls end that nothing is wrong with."""
 
@@ -271,7 +271,7 @@ class Placing:
         self._emit(PayloadSentAway(parcel.key, host, (sent_away(parcel, host),)))
 
     def _tell_missing(self, case: Case) -> None:
-        """Say once that nobody takes it, and why."""
+        """Say once that no peer takes it, and why."""
         problems = tuple(
             replace(problem, where=host)
             for host, declined in sorted(case.declined.items())

@@ -73,7 +73,7 @@ class Taking:
         self._children, self._emit = children, emit
         self._rules, self._judged_by, self._is_open = rules, judged_by, is_open
         self._turns: dict[PeerKey, asyncio.Semaphore] = {}
-        """By peer: one that stalls keeps nobody else waiting."""
+        """By peer: one that stalls does not keep other peers waiting."""
         self._numbers = itertools.count(1)
         self._guests: dict[str, Guest] = {}
         self._started = asyncio.Event()
@@ -142,7 +142,8 @@ class Taking:
             raise InstallFailed(Problem("IO_ERROR", told, where=guest.offer.payload_id)) from error
 
     async def _judged(self, guest: Guest) -> dict[str, Any]:
-        """What children judge a payload by: a release of it that is in force makes room for it."""
+        """What children judge a payload by: the active release of it is stopped, and its memory
+        freed, for the new one."""
         active = (p for p in self._state().payloads.values() if p.step is Step.ACTIVE)
         same = (p.key for p in active if p.payload_id == guest.offer.payload_id)
         beside = next(same, "")

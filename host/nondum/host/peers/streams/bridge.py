@@ -137,8 +137,8 @@ class Bridge:
         """Read a stream of type `kind` that another host has granted; the number of the import.
 
         `addresses` are those of the host (`tcp://HOST:PORT`); the port is the grant's. `on_over`
-        is called once when it has ended, not after `unimport`. Raises `WorkerFailed` with what the
-        other bridge, or nobody, answered; `LinkClosed`.
+        is called once when it has ended, not after `unimport`. Raises `WorkerFailed` with the
+        answer of the other bridge, or if it does not answer; `LinkClosed`.
         """
         number = next(self._numbers)
         body = {
@@ -256,7 +256,7 @@ class Bridge:
             self._ending = asyncio.get_running_loop().call_later(self._idle_s, self._end)
 
     def _end(self) -> None:
-        """End the child; whoever needs one from now on starts another."""
+        """End the child; the next call that needs one starts another."""
         running, self._running = self._running, None
         if running is not None:
             ending = _ended(running.link, running.process, GRACE_S)

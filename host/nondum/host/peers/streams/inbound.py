@@ -110,7 +110,7 @@ class Inbound:
     def _stop(self, problem: Problem) -> None:
         if not self.opened.done():
             self.opened.set_exception(WorkerFailed(problem))
-            self.opened.exception()  # mark as seen: nobody may be waiting
+            self.opened.exception()  # mark as seen: perhaps no caller waits
             self.close()
         else:
             self.close()

@@ -43,7 +43,9 @@ class Outbound:
         """A message has arrived that was not taken yet."""
         self._is_claimed = False
         self._is_warned = False
-        self._outgoing = exporter.grant(token, reader, kind, self._on_room, self._on_reader_gone)
+        self._outgoing = exporter.grant(
+            token, reader, kind, self._on_can_send, self._on_reader_gone
+        )
         self._consumer = Consumer(kind, packets, self._on_message, self._on_producer_gone)
 
     def figures(self) -> dict[str, Any]:
@@ -63,18 +65,18 @@ class Outbound:
             self._compressing.cancel()
 
     def _on_message(self) -> None:
-        if self._waits and self._is_claimed and not self._outgoing.has_room:
+        if self._waits and self._is_claimed and not self._outgoing.can_send:
             self._fidelity.dropped(self._loop.time())
         self._waits = True
         self._send()
 
-    def _on_room(self) -> None:
+    def _on_can_send(self) -> None:
         if not self._is_claimed:  # a reader gets what comes from now on, like any other
             self._is_claimed, self._waits = True, False
         self._send()
 
     def _send(self) -> None:
-        if not self._waits or self._compressing is not None or not self._outgoing.has_room:
+        if not self._waits or self._compressing is not None or not self._outgoing.can_send:
             return
         self._waits = False
         try:
@@ -103,7 +105,7 @@ class Outbound:
         self._send()
 
     def _hand_over(self, coding: Coding, header: dict[str, Any], bulk: Buffer | None) -> None:
-        if not self._outgoing.has_room:
+        if not self._outgoing.can_send:
             return  # its reader went while it was compressed
         length = 0 if bulk is None else memoryview(bulk).nbytes
         try:

@@ -1,7 +1,7 @@
 """Streams of other hosts that are read here: each is opened once, however many read it.
 
 A stream that ends while it is wanted (a bridge died, the network broke) is opened again, and its
-readers are wired anew, until nobody wants it any more.
+readers are connected again, until no reader wants it any more.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Feedback as a part of a running host: listens to what happens, works out the state, and hands it
-to whatever shows it."""
+"""Feedback of a running host: follows events, works out the state, and passes it to the outputs
+(lamps, sounds, what is spoken, programs)."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from nondum.host.core.events import (
     DriveUnreadable,
     Event,
 )
-from nondum.host.core.feedback_state import NOTHING, Concern, State
+from nondum.host.core.feedback_state import NOTHING, State, StateReason
 from nondum.host.core.records import Snapshot
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.people.feedback import showing
-from nondum.host.people.feedback.concerns import Known, concerns, refusal
 from nondum.host.people.feedback.outputs import Outlet, Output
 from nondum.host.people.feedback.showing import Durations, Shown
+from nondum.host.people.feedback.state_reasons import Known, refusal, state_reasons
 from nondum.sdk.errors import Problem
 
 
@@ -35,8 +35,8 @@ class Sources:
     snapshot: Callable[[], Snapshot]
     places: Callable[[], Mapping[str, str]]
     goals: Callable[[], Iterable[GivenGoal]]
-    more: Callable[[], tuple[Concern, ...]] = tuple
-    """Concerns of those who know of them by themselves."""
+    more: Callable[[], tuple[StateReason, ...]] = tuple
+    """State reasons that other parts of the host work out."""
 
 
 class Feedback:
@@ -62,9 +62,9 @@ class Feedback:
         self._news = asyncio.Event()
 
     @property
-    def now(self) -> Concern:
+    def now(self) -> StateReason:
         """What is shown now; its `sentence` says it in words."""
-        return self._shown.concern
+        return self._shown.reason
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ class Feedback:
 
     def to_dict(self) -> dict[str, Any]:
         """What is shown now, for people's tools."""
-        return self._look().concern.to_dict()
+        return self._look().reason.to_dict()
 
     def on_event(self, event: Event) -> None:
         """Take in what has happened."""
@@ -102,12 +102,12 @@ class Feedback:
             tasks.create_task(self._follow())
 
     async def _follow(self) -> None:
-        last: Concern | None = None
+        last: StateReason | None = None
         while True:
             self._news.clear()
             now = self._look()
-            if now.concern != last:
-                last = now.concern
+            if now.reason != last:
+                last = now.reason
                 for outlet in self._outlets:
                     outlet.show(last)
                 self._on_change()
@@ -122,7 +122,7 @@ class Feedback:
             return
 
     def _look(self) -> Shown:
-        found, now_s = concerns(self._known()), self._now_s()
+        found, now_s = state_reasons(self._known()), self._now_s()
         self._since = showing.since(self._since, found, now_s)
         self._shown = showing.shown(found, self._since, now_s, self._durations)
         return self._shown

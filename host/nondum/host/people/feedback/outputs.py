@@ -1,5 +1,5 @@
-"""The seam of what shows a state: each in a task of its own, the newest state first, and none of
-them able to hold anything else up."""
+"""The interface of outputs that show a state. Each output runs in a separate task, is given the
+newest state first, and cannot block anything else."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
-from nondum.host.core.feedback_state import Concern
+from nondum.host.core.feedback_state import StateReason
 from nondum.sdk.errors import NondumError
 
 log = logging.getLogger(__name__)
@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 class Output(Protocol):
     """A way to show a state to a person."""
 
-    async def show(self, concern: Concern) -> None:
+    async def show(self, reason: StateReason) -> None:
         """Show it. Raises `NondumError` where that cannot be done."""
         ...
 
@@ -35,12 +35,12 @@ class Outlet:
         self.problems: tuple[str, ...] = ()
         """Why the last state could not be shown; told in every status."""
         self._output = output
-        self._newest: Concern | None = None
+        self._newest: StateReason | None = None
         self._news = asyncio.Event()
 
-    def show(self, concern: Concern) -> None:
+    def show(self, reason: StateReason) -> None:
         """Have a state shown, instead of what waits to be; never blocks."""
-        self._newest = concern
+        self._newest = reason
         self._news.set()
 
     async def run(self) -> None:
@@ -54,9 +54,9 @@ class Outlet:
         finally:
             await asyncio.shield(self._end())
 
-    async def _show(self, concern: Concern) -> None:
+    async def _show(self, reason: StateReason) -> None:
         try:
-            await self._output.show(concern)
+            await self._output.show(reason)
         except NondumError as error:
             self._note(tuple(map(str, error.problems)))
         except Exception as error:  # a lamp must not end the robot

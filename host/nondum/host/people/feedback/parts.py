@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.feedback_section import FeedbackSection
-from nondum.host.core.feedback_state import Concern
+from nondum.host.core.feedback_state import StateReason
 from nondum.host.mind.mind import Mind
 from nondum.host.people.conversation import LONGEST_SPOKEN, UNSAID, Conversation
 from nondum.host.people.feedback.feedback import Feedback, Sources
@@ -25,13 +25,13 @@ def made(
     catalogue: Catalogue,
     mind: Mind,
     places: Callable[[], Mapping[str, str]],
-    more: Callable[[], tuple[Concern, ...]],
+    more: Callable[[], tuple[StateReason, ...]],
     conversation: Conversation,
     on_change: Callable[[], None],
 ) -> Feedback:
-    """What shows people how the host is who have no screen. `state` is the daemon's folder,
-    `places` the payloads that run on peers, `more` what others know to be amiss; `on_change` is
-    called whenever it shows another."""
+    """Make the feedback for people without a screen. `state` is the daemon's folder, `places` the
+    payloads that run on peers, `more` the state reasons that other parts of the host work out;
+    `on_change` is called whenever another state is shown."""
     sources = Sources(catalogue.snapshot, places, lambda: mind.queue, more)
     durations = Durations(section.refused_s, section.safe_s)
     outputs = tuple(_outputs(section, state, mind, conversation))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from nondum.host.core.feedback_state import Concern, State
+from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.people.feedback import program
 from nondum.host.people.feedback.tones import TUNES, wav
 from nondum.sdk.errors import InstallFailed, Problem
@@ -20,12 +20,12 @@ class Player:
         self._command = tuple(command)
         self._last: State | None = None
 
-    async def show(self, concern: Concern) -> None:
+    async def show(self, reason: StateReason) -> None:
         """Play it, unless it is the same as before. Raises `InstallFailed` (SOUND_FAILED)."""
-        if concern.state is self._last:
+        if reason.state is self._last:
             return
-        self._last = concern.state
-        data = wav(TUNES[concern.state])
+        self._last = reason.state
+        data = wav(TUNES[reason.state])
         try:
             ended = await program.run(self._command, {}, data, PLAY_S)
         except OSError as error:

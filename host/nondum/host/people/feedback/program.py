@@ -1,4 +1,4 @@
-"""Running an integrator's program: in a group of its own, for a while, and never longer."""
+"""Running an integrator's program: in a separate process group, with a deadline."""
 
 from __future__ import annotations
 
@@ -107,8 +107,8 @@ def _failed(code: str, text: str, command: Sequence[str], fix: str) -> InstallFa
 
 
 class _Talk(asyncio.SubprocessProtocol):
-    """Hears a program. That it has ended counts, not that all have who may write in its place:
-    streams of asyncio would wait for those, too."""
+    """Reads the output of a program until the program exits. Processes that inherited its output
+    may still run then; streams of asyncio would wait for those, too."""
 
     def __init__(self) -> None:
         self.exited, self.closed = asyncio.Event(), asyncio.Event()
@@ -123,7 +123,7 @@ class _Talk(asyncio.SubprocessProtocol):
         self.exited.set()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It has ended, and nobody can write in its place."""
+        """The program has exited, and its output is closed."""
         self.closed.set()
 
 

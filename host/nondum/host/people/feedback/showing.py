@@ -1,4 +1,4 @@
-"""Which of all concerns is shown, and until when. Pure: the time is told.
+"""Which of all state reasons is shown, and until when. Pure: the caller passes the time.
 
 Some states are news, and are shown for a while only: a refusal that was seen is in every status,
 and must not hide for ever that the next drive is well. What is gone, pulled for instance, is shown
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from nondum.host.core.feedback_state import NOTHING, PRIORITY, Concern, State
+from nondum.host.core.feedback_state import NOTHING, PRIORITY, State, StateReason
 
 Since: TypeAlias = Mapping[tuple[State, str, str], float]
 """State, what about, and code → when it was first known, in seconds of a clock that only rises."""
@@ -33,27 +33,29 @@ class Durations:
 class Shown:
     """What is shown now."""
 
-    concern: Concern
+    reason: StateReason
     until_s: float | None
     """When it ends by itself, by the same clock; None: it does not."""
 
 
-def since(before: Since, concerns: Iterable[Concern], now_s: float) -> Since:
-    """When each of the concerns that there are now was first known."""
-    return {_key(concern): before.get(_key(concern), now_s) for concern in concerns}
+def since(before: Since, reasons: Iterable[StateReason], now_s: float) -> Since:
+    """When each of the current reasons was first known."""
+    return {_key(reason): before.get(_key(reason), now_s) for reason in reasons}
 
 
-def shown(concerns: Iterable[Concern], known: Since, now_s: float, durations: Durations) -> Shown:
-    """The concern that is shown: of the first state by `PRIORITY`, the newest. That a drive may be
+def shown(
+    reasons: Iterable[StateReason], known: Since, now_s: float, durations: Durations
+) -> Shown:
+    """The reason that is shown: of the first state by `PRIORITY`, the newest. That a drive may be
     pulled is shown only until help is needed, and says so where it was needed before."""
     open_ones = []
-    for concern in concerns:
-        duration, began_s = durations.of(concern.state), known[_key(concern)]
+    for reason in reasons:
+        duration, began_s = durations.of(reason.state), known[_key(reason)]
         until_s = None if duration is None else began_s + duration
         if until_s is None or now_s < until_s:
-            rank = PRIORITY.index(_alike(concern.state))
-            is_safe = concern.state is State.SAFE
-            open_ones.append((rank, -began_s, is_safe, concern.about, concern))
+            rank = PRIORITY.index(_alike(reason.state))
+            is_safe = reason.state is State.SAFE
+            open_ones.append((rank, -began_s, is_safe, reason.about, reason))
     if not open_ones:
         return Shown(NOTHING, None)
     open_ones.sort(key=lambda found: found[:4])
@@ -72,5 +74,5 @@ def _alike(state: State) -> State:
     return State.HELP if state is State.SAFE else state
 
 
-def _key(concern: Concern) -> tuple[State, str, str]:
-    return concern.state, concern.about, concern.code
+def _key(reason: StateReason) -> tuple[State, str, str]:
+    return reason.state, reason.about, reason.code

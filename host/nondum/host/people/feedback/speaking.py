@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable
 
-from nondum.host.core.feedback_state import Concern, State
+from nondum.host.core.feedback_state import State, StateReason
 
 
 class Aloud:
-    """Says what nobody else does; satisfies `Output`."""
+    """Says the states that no announcement says; satisfies `Output`."""
 
     def __init__(
         self,
@@ -24,27 +24,27 @@ class Aloud:
         are spoken without this."""
         self._say, self._told, self._longest = say, told, longest
 
-    async def show(self, concern: Concern) -> None:
+    async def show(self, reason: StateReason) -> None:
         """Say it, where there is something to say."""
         aloud = (text for text in self._told() if len(text) <= self._longest)
-        if (text := spoken(concern, aloud, self._longest)) is not None:
+        if (text := spoken(reason, aloud, self._longest)) is not None:
             await self._say(text)
 
     async def end(self) -> None:
         """What was said was said."""
 
 
-def spoken(concern: Concern, aloud: Iterable[str], longest: int) -> str | None:
+def spoken(reason: StateReason, aloud: Iterable[str], longest: int) -> str | None:
     """What is to be said of a state, `aloud` being what is said already; None: nothing."""
-    is_news = concern.state is State.SAFE or (
-        concern.state in (State.REFUSED, State.HELP) and concern.code != ""
+    is_news = reason.state is State.SAFE or (
+        reason.state in (State.REFUSED, State.HELP) and reason.code != ""
     )
-    subject = concern.payload or concern.drive
+    subject = reason.payload or reason.drive
     if not is_news or not subject:
         return None
-    if any(subject in text and concern.code in text for text in aloud if concern.code):
+    if any(subject in text and reason.code in text for text in aloud if reason.code):
         return None
-    return shortened(concern.sentence, longest)
+    return shortened(reason.sentence, longest)
 
 
 def shortened(text: str, longest: int) -> str:

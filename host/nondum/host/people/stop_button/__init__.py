@@ -1,1 +1,1 @@
-"""The key that stops the robot: read by the host itself, and by nobody else."""
+"""The key that stops the robot: only the host itself reads it."""

@@ -43,8 +43,8 @@ def pids(folder: Path) -> tuple[int, ...]:
     return tuple(sorted(int(pid) for pid in words(folder / "cgroup.procs")))
 
 
-def inside(folder: Path) -> tuple[str, ...]:
-    """The names of the cgroups in one."""
+def child_names(folder: Path) -> tuple[str, ...]:
+    """The names of the child cgroups of a cgroup."""
     try:
         return tuple(sorted(entry.name for entry in folder.iterdir() if entry.is_dir()))
     except FileNotFoundError:

@@ -1,7 +1,7 @@
 """The cgroups of a daemon's workers: limits on all processes of one together, and their sure end.
 
 Version 2 is used where there is any, version 1 where that has the controllers; where there is
-neither, or the daemon may not use them, cgroups hold nobody and say so.
+neither, or the daemon may not use them, cgroups hold no processes and say so.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from nondum.host.sandbox.cgroups.version2 import Version2
 from nondum.sdk.errors import Problem
 
 EMPTY_S = 1.0
-"""How long killed processes are waited for: one in the kernel's hands may never end."""
+"""How long killed processes are waited for: one in uninterruptible sleep may never end."""
 PAUSE_S = 0.005
 GENERATIONS = 2
 """How often the children of a process that is put in are looked for: they may fork meanwhile."""
@@ -151,7 +151,7 @@ class Cgroups:
 
 
 class NoTree:
-    """Where there are no cgroups that this daemon may use: cgroups that hold nobody."""
+    """Where there are no cgroups that this daemon may use: cgroups that hold no processes."""
 
     kind = ""
     controllers: frozenset[str] = frozenset()

@@ -13,7 +13,7 @@ MEGABYTE = 1024 * 1024
 NAME = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,62})\.[0-9]{1,9}")
 """A cgroup's name: a component and a number, since an upgrade has two workers for a while."""
 WEIGHT = 100
-"""Processor weight of what has none of its own (cpu.weight)."""
+"""Processor weight of a process that has no own weight (cpu.weight)."""
 
 
 @dataclass(frozen=True, slots=True)

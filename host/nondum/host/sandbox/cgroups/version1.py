@@ -17,7 +17,7 @@ USED = ("memory", "pids", "cpu", "cpuacct", "freezer")
 LIMITING = frozenset({"memory", "pids", "cpu"})
 PERIOD_US = 100_000
 SHARES = 1024
-"""cpu.shares of what has no weight of its own."""
+"""cpu.shares of a process that has no own weight."""
 
 
 class Version1:
@@ -32,7 +32,7 @@ class Version1:
 
     @classmethod
     def open(cls, hierarchies: Iterable[Mounted], owner: str) -> Version1 | None:
-        """Make room for cgroups wherever a controller is mounted. None where there is no such."""
+        """Make a folder for cgroups wherever a controller is mounted; None where none is."""
         bases: dict[str, Path] = {}
         for hierarchy in hierarchies:
             for controller in hierarchy.controllers & set(USED):
@@ -84,7 +84,7 @@ class Version1:
 
     def names(self) -> tuple[str, ...]:
         """All cgroups."""
-        found = {name for base in self._bases.values() for name in files.inside(base)}
+        found = {name for base in self._bases.values() for name in files.child_names(base)}
         return tuple(sorted(found))
 
     def close(self) -> None:

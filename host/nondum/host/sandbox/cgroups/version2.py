@@ -2,7 +2,7 @@
 
 A service that systemd lends its own part (`Delegate=yes`) needs no privilege. Where limits are to
 be set for the cgroups inside one, no process may be in that one itself ("no internal processes"),
-so the daemon moves to a leaf of its own.
+so the daemon moves to a separate leaf.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Version2:
 
     @classmethod
     def open(cls, own: Path, top: Path, owner: str) -> Version2 | None:
-        """Make room for cgroups in this process's own cgroup, or below the top one.
+        """Make a folder for cgroups in this process's own cgroup, or below the top one.
 
         None where neither can be written.
         """
@@ -107,7 +107,7 @@ class Version2:
 
     def names(self) -> tuple[str, ...]:
         """All cgroups."""
-        return files.inside(self._base)
+        return files.child_names(self._base)
 
     def close(self) -> None:
         """Remove the folder of the cgroups if they are gone (see `Tree`)."""

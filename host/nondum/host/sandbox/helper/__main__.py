@@ -35,7 +35,7 @@ OWNER = "nondum-helper"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Serve one user by the socket that systemd hands over."""
+    """Serve one user by the socket that systemd passes (sd_listen_fds(3))."""
     told = _parser().parse_args(arguments)
     os.umask(0o022)
     uid = pwd.getpwnam(told.user).pw_uid
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         lamps=partial(_lamps, told.config, told.run / "lamps.json"),
         stop_key=partial(_stop_key, told.config),
     )
-    service.nodes.prepare()  # workers' rooms, which are made early, show what is below it
+    service.nodes.prepare()  # sandboxes of workers, which are made early, show what is below it
     # No exception: Python drops those of signal handlers that run in its callbacks after a fork.
     ending, end = os.pipe()
     signal.signal(signal.SIGTERM, lambda *_: os.write(end, b"."))

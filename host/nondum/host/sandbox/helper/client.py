@@ -131,7 +131,7 @@ class HelperClient:
             # Who is turned away is answered before the question is heard.
             with contextlib.suppress(BrokenPipeError):
                 socket.send_fds(asked, [requests.encode(request)], descriptors)
-            answer = _heard(asked)
+            answer = _received(asked)
         except OSError as error:
             raise _silent(str(error)) from error
         if not answer:
@@ -242,7 +242,7 @@ def _opened() -> socket.socket:
 
 
 def _connect(asked: socket.socket, path: Path) -> None:
-    """Connect, once there is room among those who wait."""
+    """Connect, once the queue of waiting connections has a free place (listen(2))."""
     until_s = time.monotonic() + WAIT_S
     while True:
         try:
@@ -253,7 +253,7 @@ def _connect(asked: socket.socket, path: Path) -> None:
             time.sleep(PAUSE_S)
 
 
-def _heard(asked: socket.socket) -> bytes:
+def _received(asked: socket.socket) -> bytes:
     try:
         return asked.recv(requests.ANSWER_BYTES)
     except ConnectionResetError:  # the question was not read, which is told first

@@ -1,6 +1,7 @@
-"""Nodes of devices that components were granted: a folder for each, on a file system of its own.
+"""Nodes of devices that components were granted: a folder for each, on a separate file system.
 
-/run may hold no devices (`nodev`), so the folder is a small tmpfs; only who owns a node opens it.
+/run may hold no devices (`nodev`), so the folder is a small tmpfs; only the owner of a node opens
+it.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ MS_NOSUID, MS_NOEXEC = 0x2, 0x8
 _RAW = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic"})
 """Subsystems whose nodes give away whole disks."""
 KEYBOARD = ("03", "01")
-"""Interface class and protocol (USB HID 1.11, 4.2): what is typed is nobody's but the machine's."""
+"""Interface class and protocol (USB HID 1.11, 4.2); no component may read what people type."""
 _ENTER = 28
 _LETTERS = (*range(16, 26), *range(30, 39), *range(44, 51))
 """From Q to P, from A to L, from Z to M."""
@@ -57,7 +58,7 @@ class Nodes:
         fresh.unlink(missing_ok=True)
         os.mknod(fresh, stat.S_IFCHR | 0o600, os.makedev(major, minor))
         os.chown(fresh, self.uid if user is None else user, -1)
-        fresh.rename(node)  # whoever looks finds the old one or the new one
+        fresh.rename(node)  # atomic: a reader finds the old node or the new one
         if self._identity(major, minor) != device:  # pulled meanwhile: its removal may be past
             node.unlink(missing_ok=True)
             raise refused("there is no such device", f"{major}:{minor}")
@@ -160,8 +161,8 @@ def _is_keyboard(device: Path) -> bool:
 def _types(device: Path, subsystem: str) -> bool:
     """Whether an input device that it is of, or that is of its interface, has letters and Enter.
 
-    Keyboards that a machine's firmware cannot use have no protocol of their own. An input node
-    tells of its own input device only; others may tell all that comes from their interface.
+    A keyboard without the boot interface declares no protocol (bInterfaceProtocol). An input node
+    tells of its input device only; other nodes may tell all that comes from their interface.
     """
     if subsystem == "input":
         return _has_letters(device.parent)
@@ -179,7 +180,7 @@ def _has_letters(device: Path) -> bool:
         for word in words:
             bits = bits << _WORD | int(word, 16)
     except ValueError:
-        return True  # nobody knows
+        return True  # unknown
     return bool(bits >> _ENTER & 1 and any(bits >> letter & 1 for letter in _LETTERS))
 
 

@@ -34,7 +34,7 @@ def drive_name(device: str, diskseq: int | None) -> str:
 @contextmanager
 def held(node: Path, drive: str = "", ours: Path | None = None) -> Iterator[Path]:
     """A path by which the node of that drive can be mounted, read-only from now on until it is
-    plugged in anew, and sure to be no other drive's while the context lasts.
+    plugged in again, and sure to be no other drive's while the context lasts.
 
     `drive` is as `drive_name` gives it; empty: whichever it is. Raises `DriveGone` (DRIVE_GONE)
     when it is another one by now, `PayloadRefused` (DRIVE_MOUNTED) when somebody else has it: it is
@@ -58,12 +58,12 @@ def held(node: Path, drive: str = "", ours: Path | None = None) -> Iterator[Path
 
 @contextmanager
 def _claimed(path: Path, node: Path, ours: Path | None) -> Iterator[None]:
-    """Have a device that nobody else has, as long as the context lasts. Raises `PayloadRefused`
+    """Claim a device that is not in use, as long as the context lasts. Raises `PayloadRefused`
     (DRIVE_MOUNTED).
 
-    O_EXCL claims it as mounts and swaps do (open(2)): were it only asked whether somebody has it,
-    the answer might be true no more. What this host has mounted itself, or has just let go, is
-    claimed already; and what has gone meanwhile, nobody can mount.
+    O_EXCL claims it as mounts and swaps do (open(2)): the answer to a mere question whether it is
+    in use could be out of date. What this host has mounted itself, or has just let go, is
+    claimed already; and what has gone meanwhile can no longer be mounted.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_EXCL)

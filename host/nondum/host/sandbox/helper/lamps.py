@@ -1,7 +1,7 @@
 """Lamps of the kernel's LED class: made to show a state, and at the end what they showed before.
 
-What they showed is kept in a file from the first state on, so that whoever comes after a daemon
-that was killed still knows it.
+What they showed is kept in a file from the first state on, so that the next daemon after one that
+was killed still knows it.
 """
 
 from __future__ import annotations

@@ -16,11 +16,11 @@ class Mount:
     """One mount."""
 
     number: int
-    """The device; file systems of several devices have a number of their own (btrfs)."""
+    """The device; file systems of several devices have a separate number (btrfs)."""
     at: str
     """Where it is mounted."""
     source: str
-    """What was mounted, by the word of whoever did: for most file systems the device's node."""
+    """The mount source, as mount(2) was given it: for most file systems the device's node."""
 
 
 def parsed(text: str) -> Iterator[Mount]:

@@ -1,4 +1,4 @@
-"""Presses of the stop key, whoever reads its device."""
+"""Presses of the stop key, read by the helper or by the daemon itself."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ class InProcess:
         """Write the map (see `Privileged`)."""
         process = worker_users.opened(pid)
         try:
-            worker_users.map_room_of_root(process)
+            worker_users.map_namespace_of_root(process)
         finally:
             os.close(process)
 

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, TypeAlias, get_args, get_type_hints
 
 from nondum.host.core.feedback_state import State
-from nondum.host.sandbox.cgroups.limits import NAME as CAGE
+from nondum.host.sandbox.cgroups.limits import NAME as CGROUP_NAME
 from nondum.host.sandbox.cgroups.limits import CgroupLimits
 from nondum.sdk.errors import NondumError, Problem
 
@@ -209,7 +209,7 @@ _FORMS = {
     "component": COMPONENT,
     "need": NEED,
     "filesystem": FILESYSTEM,
-    "cgroup": CAGE,
+    "cgroup": CGROUP_NAME,
     "state": STATE,
 }
 _MOST = 2**63 - 1

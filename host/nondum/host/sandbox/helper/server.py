@@ -34,7 +34,7 @@ _CREDENTIALS = struct.Struct("3i")
 
 
 class Server:
-    """Serves connections until it is told to end, or nobody comes any more."""
+    """Serves connections until it is told to end, or no more connections come."""
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
     """Take one question and do what it asks; the answer, or what is wrong."""
     brought: list[int] = []
     try:
-        # There is room for one descriptor: the kernel closes all others.
+        # The buffer takes one descriptor: the kernel closes all others.
         data, brought, flags, _ = socket.recv_fds(connection, requests.MAX_BYTES + 1, 1)
         if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
             raise refused("a question is one short packet")
@@ -177,7 +177,7 @@ def _peer(connection: socket.socket) -> int:
 def _say(connection: socket.socket, said: dict[str, Any]) -> None:
     try:
         connection.send(json.dumps(said, separators=(",", ":")).encode(), socket.MSG_DONTWAIT)
-    except OSError:  # nobody waits for it
+    except OSError:  # the client does not wait for it
         return
 
 

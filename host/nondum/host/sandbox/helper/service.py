@@ -1,4 +1,4 @@
-"""What the helper does when it is asked: every verb, on places of its own choosing."""
+"""What the helper does for each request, on paths that it chooses itself."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from nondum.host.sandbox.helper.requests import Request, refused
 from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 
 MOST_DRIVES = 128
-MOST_CAGES = 512
+MOST_CGROUPS = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +100,13 @@ class Service:
         with self._held(pid):
             process = worker_users.opened(pid)
         try:
-            worker_users.map_room_of(process, self.uid, self.gid)
+            worker_users.map_namespace(process, self.uid, self.gid)
         finally:
             os.close(process)
 
     def _map_folder(self, mount: int, user: int) -> None:
-        """What is not the daemon's is nobody's in such a mount, so nothing is gained by one."""
+        """Map a folder of the daemon. Files of other users in it have no mapped owner in such a
+        mount, so the daemon gains nothing by mapping one."""
         _check_user(user)
         about = os.fstat(mount)
         if not stat.S_ISDIR(about.st_mode) or about.st_uid != self.uid:
@@ -121,8 +122,8 @@ class Service:
             case requests.ReadCgroup(cgroup):
                 return {"pids": tree.pids(cgroup)[:4096], "usage": asdict(tree.usage(cgroup))}
             case requests.MakeCgroup(cgroup):
-                if len(tree.names()) >= MOST_CAGES:
-                    raise refused(f"there are {MOST_CAGES} cgroups already")
+                if len(tree.names()) >= MOST_CGROUPS:
+                    raise refused(f"there are {MOST_CGROUPS} cgroups already")
                 tree.make(cgroup)
             case requests.LimitCgroup(cgroup):
                 tree.limit(cgroup, request.limits)

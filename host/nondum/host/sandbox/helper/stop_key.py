@@ -1,4 +1,4 @@
-"""One key of an input device: who reads it sees no other (EVIOCSMASK), and takes it from nobody.
+"""One key of an input device: its reader sees no other key (EVIOCSMASK) and does not grab it.
 
 Source: Linux, Documentation/input/input.rst and include/uapi/linux/input.h.
 """
@@ -77,7 +77,7 @@ def opened(path: Path, code: int) -> PressesOfDevice:
             raise unusable(path, "it is no device")
         if not _bit(descriptor, _EVIOCGBIT_KEY, code):
             raise unusable(path, f"it has no key with the code {code}")
-        _hide_others(descriptor, code)
+        _mask_all_but(descriptor, code)
         return PressesOfDevice(descriptor, code, is_down=_bit(descriptor, _EVIOCGKEY, code))
     except OSError as error:
         os.close(descriptor)
@@ -101,8 +101,8 @@ def _bit(descriptor: int, request: int, code: int) -> bool:
     return bool(bits[code // 8] >> code % 8 & 1)
 
 
-def _hide_others(descriptor: int, code: int) -> None:
-    """Have the kernel keep all other events to itself (Linux 4.4)."""
+def _mask_all_but(descriptor: int, code: int) -> None:
+    """Have the kernel send this reader no events but those of one key (Linux 4.4)."""
     bits = bytearray(_BYTES)
     bits[code // 8] |= 1 << code % 8
     _mask(descriptor, EV_KEY, bytes(bits))

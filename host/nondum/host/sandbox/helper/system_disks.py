@@ -1,7 +1,7 @@
 """Which block devices are the machine's own, whatever they hang on: pure.
 
 A robot may boot from a USB disk, keep /var on one, swap to it, or have made an array of several.
-Such a disk is the machine's as a whole: partitions of it that nobody uses are no drives either.
+Such a disk is the machine's as a whole: unused partitions of it are no drives either.
 What a person or a desktop has mounted where people look for their sticks is theirs, and no more
 than that one partition.
 """

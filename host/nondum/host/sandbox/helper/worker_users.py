@@ -1,4 +1,4 @@
-"""Users of the machine that are workers' alone, and how rooms and scratch folders get them.
+"""Users of the machine that are workers' alone, and how sandboxes and scratch folders get them.
 
 Writing a map of users takes a process that may be any (user_namespaces(7)). A mount that has one
 shows the files of one user as those of another (mount_setattr(2), Linux 5.12).
@@ -21,19 +21,19 @@ OF_SERVICE = range(69632, 73968)
 that it gets no power over the processes of other services."""
 MADE_S = 10.0
 """How long a process may take to make a user namespace, which its owner may have stopped: less than
-whoever waits for it has (`server.DRIVE_S`)."""
+the process that waits for it has (`server.DRIVE_S`)."""
 _MESSAGE_BYTES = 16
 
 
-def map_room_of_root(process: int) -> None:
-    """Have a new user namespace know root, the users of workers and the groups of devices: that of
-    a process, by a descriptor of its folder in /proc. Raises `OSError`."""
+def map_namespace_of_root(process: int) -> None:
+    """Map root, the users of workers and the groups of devices in the new user namespace of a
+    process, which is given by a descriptor of its folder in /proc. Raises `OSError`."""
     _write(process, "uid_map", f"0 0 1\n{_same(OF_ROOT)}")
     _write(process, "gid_map", f"0 0 {OF_ROOT.stop}\n")  # dialout, video, …
 
 
-def map_room_of(process: int, user: int, group: int) -> None:
-    """Have one know its maker, as its root, and the users of workers.
+def map_namespace(process: int, user: int, group: int) -> None:
+    """Map the maker of a new user namespace, as its root, and the users of workers in it.
 
     Its processes keep the maker's other groups, which they may not leave. Raises `OSError`.
     """
@@ -43,8 +43,9 @@ def map_room_of(process: int, user: int, group: int) -> None:
 
 
 def map_folder(mount: int, owner: tuple[int, int], user: int) -> None:
-    """Have a mount that is not in place yet (open_tree(2)) show what is the owner's, a user and a
-    group, as a user's; what is anybody else's is nobody's there. No set-id bits, no devices.
+    """Have a mount that is not in place yet (open_tree(2)) show the files of `owner`, a user and a
+    group, as those of `user`. Files of other users show the overflow user there (65534).
+    No set-id bits, no devices.
 
     Raises `OSError`: the file system cannot do that, or the mount is in place.
     """
@@ -85,7 +86,7 @@ def namespace(owner: tuple[int, int], user: int) -> Iterator[int]:
 
 
 def _make(told: socket.socket, owner: tuple[int, int]) -> None:
-    """In a process of its own: make the namespace, and stay until it is killed, or its parent has
+    """In the forked process: make the namespace, and stay until it is killed, or its parent has
     ended. Does not return."""
     try:
         os.setgroups([])

@@ -3,7 +3,7 @@ limits and its host, then run the SDK.
 
 Run by path as `python -I -S -B -u bootstrap.py ORDERS HOST`: the descriptor of a socket on which
 one JSON object comes, with the link's descriptor (see `workers/launcher.py`), and the host's
-process id; 0 where it has none, in a process namespace of its own. No start-up hook of any wheel
+process id; 0 where it has none, in a separate process namespace. No start-up hook of any wheel
 has run, and none will, since site-packages are appended to `sys.path` and not added with
 `site.addsitedir`.
 """
@@ -45,8 +45,8 @@ def main(orders: int, host_pid: int) -> None:
         raise SystemExit(0)  # not needed
     parameters = json.loads(order)
     settle(parameters)
-    if parameters["room"] is not None:
-        inside["init"].keep(waiting, parameters["room"], descriptors)
+    if parameters["mounts"] is not None:
+        inside["init"].fork_worker(waiting, parameters["mounts"], descriptors)
     else:
         waiting.close()
     become(inside, parameters, descriptors, host_pid)
@@ -63,7 +63,7 @@ def become(
     kernel = inside["kernel"]
     os.chdir(parameters["scratch"])
     inside["limits"].limit(parameters["limits"])
-    inside["restrict"].put_up(parameters["walls"], next(iter(rulesets), None))
+    inside["restrict"].restrict(parameters["restrictions"], next(iter(rulesets), None))
     if host_pid:
         die_with(kernel, host_pid)
     kernel.prctl(kernel.PR_SET_NAME, kernel.text(parameters["component"][:15]))
@@ -84,7 +84,7 @@ def settle(parameters: Mapping[str, Any]) -> None:
     What a process starts inherits that, but what others see of the process itself is the memory
     that it was started with (proc_pid_environ(5)), so the mark is written there as well.
     """
-    place = address_of(os.fsencode(parameters["room_for_mark"]) + b"=")
+    place = address_of(os.fsencode(parameters["mark_placeholder"]) + b"=")
     size = len(ctypes.string_at(place))
     os.environ.clear()
     os.environ.update(parameters["environment"])
@@ -107,7 +107,7 @@ def die_with(kernel: ModuleType, host_pid: int) -> None:
     The kernel tells of the host's death by SIGINT, signal number 2, and its handler is the C
     library's own `alarm`: called as `alarm(2)`, without the interpreter, it has SIGALRM end the
     process in two seconds. Until then the plugin, which sees its link closed, may leave everything
-    safe. (Terminals do not reach workers: they are sessions of their own.)
+    safe. (Terminals do not reach workers: each worker is a separate session, setsid(2).)
     """
     libc = kernel.LIBC
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # so that asyncio leaves it alone

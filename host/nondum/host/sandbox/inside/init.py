@@ -1,7 +1,7 @@
-"""Process 1 of a sandboxed worker: reaps what the worker leaves behind, hands in devices, and ends
-the whole namespace once the worker or the host has ended.
+"""Process 1 of a sandbox: reaps what the worker leaves behind, mounts devices, and ends the whole
+namespace once the worker or the host has ended.
 
-The worker, in a user namespace of its own, can neither look into it nor signal it.
+The worker, in a separate user namespace, can neither look into it nor signal it.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ GRACE_S = 2.0
 """What a worker has to leave everything safe once the host has ended."""
 ORDER_BYTES = 4096
 MOST_DELETED = 50_000
-"""Files that are open and deleted: so many are looked at."""
+"""Of files that are open and deleted, this many are looked at."""
 HOST_GONE = 1
 """Exit status, when the host was gone before the worker."""
 
 
-def keep(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) -> None:
-    """Furnish the room and fork; returns in the worker only. Raises `OSError`."""
+def fork_worker(orders: socket.socket, given: Mapping[str, Any], links: Sequence[int]) -> None:
+    """Set up the mounts and fork; returns in the worker only. Raises `OSError`."""
     # The host's end is seen at the socket from now on: the plugin may have two seconds.
     kernel.prctl(kernel.PR_SET_PDEATHSIG, 0)
     _close_all_but({0, 1, 2, orders.fileno(), *links})
     mask = os.umask(0o022)  # what is made here is for the worker, who may be another user
-    mounts.furnish(given, partial(_have_mapped, orders))
-    _say_who(orders, "keeper")
+    mounts.set_up(given, partial(_have_mapped, orders))
+    _say_who(orders, "init")
     worker = os.fork()
     if worker == 0:
         os.umask(mask)
         os.setsid()
         _say_who(orders, "worker")
         orders.close()
-        mounts.move_in(given)
+        mounts.pivot(given)
         return
     for link in links:
         os.close(link)
@@ -76,7 +76,7 @@ class _Init:
         self._poll = select.poll()
 
     def run(self) -> int:
-        """Keep house; the worker's exit status, 128 and more for a signal."""
+        """Reap and obey until the worker has ended; its exit status, 128 and more for a signal."""
         awoken = self._settle()
         self._poll.register(awoken, select.POLLIN)
         self._poll.register(self._orders, select.POLLIN)
@@ -106,14 +106,14 @@ class _Init:
         nothing = os.open(os.devnull, os.O_RDWR)
         for standard in (1, 2):  # the worker's alone: the host waits for their end
             os.dup2(nothing, standard)
-        kernel.prctl(kernel.PR_SET_NAME, kernel.text("keeper"))
+        kernel.prctl(kernel.PR_SET_NAME, kernel.text("nondum-init"))
         # Where the host may not look into its processes, this one does.
         looks = (kernel.CAP_DAC_READ_SEARCH, kernel.CAP_SYS_PTRACE)
         kernel.keep_capabilities(
             kernel.CAP_SYS_ADMIN, *(looks if self._given["maps_scratch"] else ())
         )
-        if self._given["keeper_filter"] is not None:
-            kernel.filter_calls(base64.b64decode(self._given["keeper_filter"]))
+        if self._given["init_filter"] is not None:
+            kernel.filter_calls(base64.b64decode(self._given["init_filter"]))
         return awoken
 
     def _reaped(self) -> int | None:
@@ -128,7 +128,7 @@ class _Init:
         return None
 
     def _obeyed(self) -> bool:
-        """Carry out one order; False once nobody gives any more."""
+        """Carry out one order; False once the host's end is closed."""
         try:
             data = self._orders.recv(ORDER_BYTES)
         except OSError:
@@ -152,7 +152,7 @@ class _Init:
         return True
 
     def _seen(self) -> dict[str, int]:
-        """What the processes of the room have open."""
+        """What the processes of the sandbox have open."""
         pids = [int(name) for name in os.listdir("/proc") if name.isdigit() and name != "1"]  # noqa: PTH208
         deleted = itertools.islice(
             open_files.deleted_sizes(self._given["scratch"], pids), MOST_DELETED

@@ -1,9 +1,9 @@
-"""The room of a sandboxed worker: what is seen in it, and what is no more.
+"""The mounts of a sandbox: what the worker sees in it, and what is unmounted.
 
-Bubblewrap has made the namespaces and the bare walls. Two mount namespaces follow: the *keeper's*
-(process 1), which still sees the devices of the machine so that one can be handed in while the
-worker runs, and the worker's own, a copy of it in which everything outside is unmounted. What is
-mounted below `/dev/nondum` in the first appears in the second (mount_namespaces(7), propagation).
+Bubblewrap has made the namespaces and the first mounts. Two mount namespaces follow: that of *init*
+(process 1), which still sees the devices of the machine so that one can be mounted while the worker
+runs, and the worker's own, a copy of it in which everything outside is unmounted. What is mounted
+below `/dev/nondum` in the first appears in the second (mount_namespaces(7), propagation).
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from typing import Any
 from nondum.host.sandbox.inside import kernel
 
 DEVICES = "/dev/nondum"
-NOBODY = 65534
+OVERFLOW_ID = 65534
+"""The worker's user and group in its own user namespace (/proc/sys/kernel/overflowuid)."""
 INOTIFY_INSTANCES = 16
-"""Of a worker: those of all rooms count for the user of the host, who has 128 of them."""
+"""Of one worker. Those of all sandboxes count for the user of the host, who has 128 of them."""
 _STAGED = "/run/nondum/staged"
 """Where a device is mounted before it appears: later changes of flags are not propagated."""
 _BOUND = kernel.MS_BIND | kernel.MS_REMOUNT
 
 
-def furnish(room: Mapping[str, Any], map_mount: Callable[[int], None]) -> None:
-    """Bring in what the worker may see. Raises `OSError`.
+def set_up(given: Mapping[str, Any], map_mount: Callable[[int], None]) -> None:
+    """Mount what the worker may see. Raises `OSError`.
 
     `outside`: where the host's folders are seen. `code`: folders to read. `scratch`: the folder to
     write; if the host `maps_scratch`, what is in it is the worker's there, and the host's on disk:
@@ -35,30 +36,30 @@ def furnish(room: Mapping[str, Any], map_mount: Callable[[int], None]) -> None:
     under their own names.
     `shared_mb`: size of /dev/shm. `is_last`: whether user namespaces end here.
     """
-    outside = room["outside"]
-    for folder in room["code"]:
-        bind(outside + folder, folder, kernel.MS_RDONLY if room["protects_code"] else 0)
-    if room["maps_scratch"]:
-        _bind_mapped(outside + room["scratch"], room["scratch"], map_mount)
+    outside = given["outside"]
+    for folder in given["code"]:
+        bind(outside + folder, folder, kernel.MS_RDONLY if given["protects_code"] else 0)
+    if given["maps_scratch"]:
+        _bind_mapped(outside + given["scratch"], given["scratch"], map_mount)
     else:
-        bind(outside + room["scratch"], room["scratch"], 0)
-    _mount_memory("/dev/shm", room["shared_mb"] * 1024, "1777")  # of this namespace only
+        bind(outside + given["scratch"], given["scratch"], 0)
+    _mount_memory("/dev/shm", given["shared_mb"] * 1024, "1777")  # of this namespace only
     Path("/tmp").chmod(0o1777)
     _mount_memory(DEVICES, 64, "755")
     kernel.mount(None, DEVICES, None, kernel.MS_SHARED)
-    for node in room["nodes"]:
+    for node in given["nodes"]:
         with contextlib.suppress(FileNotFoundError):  # not every machine has it
             _bind_node(outside + node, node)
-    _write_users(room["scratch"])
+    _write_users(given["scratch"])
     _let_pass(outside)
-    if room["is_last"]:  # the worker's own, below, is the only one there will ever be
+    if given["is_last"]:  # the worker's own, below, is the only one there will ever be
         Path("/proc/sys/user/max_user_namespaces").write_text("1")
     with contextlib.suppress(FileNotFoundError):  # a kernel without inotify
-        Path("/proc/sys/user/max_inotify_instances").write_text(str(room["inotify_instances"]))
+        Path("/proc/sys/user/max_inotify_instances").write_text(str(given["inotify_instances"]))
 
 
-def move_in(room: Mapping[str, Any]) -> None:
-    """Leave the keeper's view for the worker's, and its user for one that owns nothing of it.
+def pivot(given: Mapping[str, Any]) -> None:
+    """Enter the worker's mount and user namespaces, in which it owns nothing of init's.
 
     `sealed`: what may be read only, though its user might write it; `protected`: mounts likewise.
     `user`: one that is this worker's alone, also to the kernel, or null; `groups` that it has
@@ -66,23 +67,23 @@ def move_in(room: Mapping[str, Any]) -> None:
     """
     kernel.unshare(kernel.CLONE_NEWNS)
     kernel.mount(None, DEVICES, None, kernel.MS_SLAVE)
-    if room["hides_outside"]:
-        for folder in reversed(room["seen_outside"]):
-            kernel.unmount(room["outside"] + folder)
-    for folder in room["sealed"]:
+    if given["hides_outside"]:
+        for folder in reversed(given["seen_outside"]):
+            kernel.unmount(given["outside"] + folder)
+    for folder in given["sealed"]:
         with contextlib.suppress(FileNotFoundError):
             kernel.mount(folder, folder, None, kernel.MS_BIND)
             kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
-    for folder in room["protected"]:
+    for folder in given["protected"]:
         kernel.mount(None, folder, None, _BOUND | kernel.MS_RDONLY | _flags_of(folder))
-    if room["user"] is not None:
-        _become(room["user"], room["groups"])
+    if given["user"] is not None:
+        _become(given["user"], given["groups"])
     user, group = os.geteuid(), os.getegid()
-    if room["changes_user"]:
+    if given["changes_user"]:
         kernel.unshare(kernel.CLONE_NEWUSER)
         Path("/proc/self/setgroups").write_text("deny")
-        Path("/proc/self/uid_map").write_text(f"{NOBODY} {user} 1")
-        Path("/proc/self/gid_map").write_text(f"{NOBODY} {group} 1")
+        Path("/proc/self/uid_map").write_text(f"{OVERFLOW_ID} {user} 1")
+        Path("/proc/self/gid_map").write_text(f"{OVERFLOW_ID} {group} 1")
 
 
 def _become(user: int, groups: Sequence[int] | None) -> None:
@@ -105,7 +106,7 @@ def grant(outside: str, need: str, node: str, own: str) -> None:
     target = f"{DEVICES}/{need}"
     _bind_node(outside + node, target)
     if own.startswith("/dev/") and not own.startswith(f"{DEVICES}/"):
-        with contextlib.suppress(OSError):  # it is in the room anyway: /dev/zero, /dev/snd
+        with contextlib.suppress(OSError):  # it is in the sandbox anyway: /dev/zero, /dev/snd
             os.makedirs(os.path.dirname(own), exist_ok=True)  # noqa: PTH103, PTH120
             os.symlink(target, own)  # noqa: PTH211
             _links[need] = own
@@ -122,7 +123,7 @@ def revoke(need: str) -> None:
 
 
 _links: dict[str, str] = {}
-"""Of process 1 of the room: need → where a link to its node is."""
+"""In process 1 of the sandbox: need → where a link to its node is."""
 
 
 def bind(source: str, target: str, more: int = 0) -> None:
@@ -171,8 +172,8 @@ def _bind_node(source: str, target: str) -> None:
 
 
 def _let_pass(outside: str) -> None:
-    """Have everybody go through the folders that are the room's own, but for what is outside:
-    bubblewrap makes some for root only."""
+    """Let every user pass through the folders that bubblewrap made, except those below `outside`:
+    it makes some for root only."""
     own = Path("/").stat().st_dev
     folders = ["/"]
     while folders:
@@ -199,5 +200,6 @@ def _flags_of(target: str) -> int:
 def _write_users(home: str) -> None:
     """Who the worker is, for programs that ask by number (getpwuid(3))."""
     os.makedirs("/etc", exist_ok=True)  # noqa: PTH103
-    Path("/etc/passwd").write_text(f"worker:x:{NOBODY}:{NOBODY}::{home}:/usr/sbin/nologin\n")
-    Path("/etc/group").write_text(f"worker:x:{NOBODY}:\n")
+    ids = f"{OVERFLOW_ID}:{OVERFLOW_ID}"
+    Path("/etc/passwd").write_text(f"worker:x:{ids}::{home}:/usr/sbin/nologin\n")
+    Path("/etc/group").write_text(f"worker:x:{OVERFLOW_ID}:\n")

@@ -1,4 +1,4 @@
-"""What processes have open, as proc(5) tells whoever may look into them."""
+"""What processes have open, read from /proc (proc(5)) by a process that may look into them."""
 
 from __future__ import annotations
 

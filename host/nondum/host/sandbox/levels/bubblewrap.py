@@ -1,8 +1,8 @@
-"""The walls of a sandboxed worker's room: how bubblewrap is called for an interpreter that waits.
+"""The sandbox of a worker: how bubblewrap is called for an interpreter that waits.
 
-Source: bwrap(1). What only the worker needs is brought in once it is known whose room it is (see
+Source: bwrap(1). What only the worker needs is mounted once the worker is known (see
 `nondum.host.sandbox.inside.mounts`); until then the interpreter, which runs nothing but the host's
-own code, holds capabilities in a user namespace of its own.
+own code, holds capabilities in a separate user namespace.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from nondum.host.sandbox.helper.client import DEVICES
 from nondum.host.sandbox.levels.users import NewNamespace
 
 OUTSIDE = "/.host"
-"""Where the host's folders are seen, until the worker moves in."""
+"""Where the host's folders are seen, until the worker leaves init's mount namespace."""
 INSIDE = Path(__file__).parents[1] / "inside"
 PLACE_OF_INSIDE = Path("/run/nondum/host/nondum/host/sandbox/inside")
 BOOTSTRAP = PLACE_OF_INSIDE / "bootstrap.py"
 NODES = tuple(f"/dev/{name}" for name in ("null", "zero", "full", "random", "urandom", "tty"))
-"""The host's own, which bubblewrap brings into every room."""
+"""Nodes of the host that bubblewrap brings into every sandbox."""
 TEMPORARY_BYTES = 64 * 1024 * 1024
 """Size of /tmp."""
 
@@ -34,11 +34,11 @@ NAMESPACES: Mapping[str, tuple[str, ...]] = {
     "network": ("--unshare-net",),
     "cgroups": ("--unshare-cgroup-try",),
 }
-"""Walls that bubblewrap puts up, each by itself.
+"""Namespaces that bubblewrap makes, and their flags; each can be left out.
 
 Not `--die-with-parent`: a daemon that died while bubblewrap makes a user namespace would have it
-killed before it lets the process in the namespace go on, which would wait for ever. What is in the
-room sees the daemon's end by its socket, see `nondum.host.sandbox.inside`."""
+killed before it lets the process in the namespace go on, which would wait for ever. A process in
+the sandbox sees the daemon's end by its socket, see `nondum.host.sandbox.inside`."""
 SEALED: tuple[str, ...] = (
     *("/proc/sys", "/proc/sysrq-trigger", "/proc/irq", "/proc/bus", "/proc/fs", "/proc/acpi"),
 )
@@ -102,7 +102,7 @@ def command(
     """How an interpreter is started on a ground; `orders` is the descriptor that it hears at.
 
     The users of `namespace` are mapped by the caller; without one there is only the caller's.
-    `without` leaves walls of `NAMESPACES` out, so that each can be seen to matter.
+    `without` leaves names of `NAMESPACES` out, so that tests can show that each matters.
     """
     return [
         bwrap,
@@ -128,8 +128,8 @@ def seen_outside(ground: Ground) -> list[str]:
 
 
 def _namespaces(permissions: Collection[str], without: Collection[str]) -> Iterator[str]:
-    for wall, flags in NAMESPACES.items():
-        if wall not in without and not (wall == "network" and "network" in permissions):
+    for name, flags in NAMESPACES.items():
+        if name not in without and not (name == "network" and "network" in permissions):
             yield from flags
 
 

@@ -20,7 +20,7 @@ _PATH_BENEATH = 1
 _NET_PORT_NEWEST = 4
 """The ABI from which TCP ports can be refused."""
 TRUNCATES = 3
-"""The ABI from which truncating a file is a right of its own."""
+"""The ABI from which truncating a file is a separate right."""
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 _TRUNCATE, IOCTL_DEVICE = 1 << 14, 1 << 15

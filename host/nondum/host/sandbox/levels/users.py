@@ -1,9 +1,9 @@
-"""Users of the machine that are workers' alone: whose is which, and how a room comes to have them.
+"""Users of the machine that are workers' alone: which worker has which, and how they are mapped.
 
 The kernel counts some things by user, whatever namespace a process is in: descriptors under way
-over unix sockets, memory of pipes, watches of epoll. A room whose user namespace maps these users
-to themselves can have its worker become one of them. Writing such a map takes root: the daemon, or
-its helper (`nondum.host.sandbox.helper.worker_users`).
+over unix sockets, memory of pipes, watches of epoll. A sandbox whose user namespace maps these
+users to themselves can have its worker become one of them. Writing such a map takes root: the
+daemon, or its helper (`nondum.host.sandbox.helper.worker_users`).
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class NewNamespace:
     @property
     def descriptors(self) -> tuple[int, ...]:
         """What bubblewrap is to inherit. The end that is read here is among them: else bubblewrap
-        could tell nobody of its namespace once the daemon has died, and would leave it as it is."""
+        could not write of its namespace once the daemon has died, and would leave it as it is."""
         return *self._its_ends, self._tells
 
     @property

@@ -11,7 +11,7 @@ from nondum.host.sandbox.levels.users import is_workers
 from nondum.wheelhouse.format.confinement import Level
 
 MOST_PROCESSES = 3
-"""In a room of its own: its keeper, itself, and no more."""
+"""In its own sandbox a worker sees its init, itself, and no more."""
 _FIXES: Mapping[Level, str] = {
     Level.SANDBOXED: "allow bubblewrap user namespaces (`sysctl"
     " kernel.unprivileged_userns_clone=1`; with AppArmor, a profile for bwrap), or run the service"

@@ -87,7 +87,7 @@ def remembered(snapshot: Snapshot) -> Iterator[Remembered]:
 
 
 def missed(lonely: Iterable[DeviceRecord], known: Iterable[Payload]) -> list[str]:
-    """What is told of devices that nobody has; nothing of those that no known payload drives."""
+    """Sentences about devices that no component has; none about those that no payload drives."""
     payloads = tuple(known)
     told = []
     for device in lonely:

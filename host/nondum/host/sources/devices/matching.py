@@ -1,4 +1,4 @@
-"""Which nodes of a device serve a declared need, and which are left alone whoever asks. Pure."""
+"""Which nodes of a device serve a declared need, and which no component is given. Pure."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ KEYBOARD, POINTER = "01", "02"
 _HID, _HUB, _STORAGE = "03", "09", "08"
 _DISKS = frozenset({"scsi_generic", "bsg", "nvme", "nvme-generic", "block"})
 """Subsystems whose nodes give away whole disks."""
-_HANDS = frozenset({"input", "hidraw"})
-"""Subsystems whose nodes tell what hands do: a camera's picture stays one beside a touch node."""
+_INPUT_SUBSYSTEMS = frozenset({"input", "hidraw"})
+"""Subsystems of pointing devices: a camera's video node is none, even beside a touch node."""
 _POINTS = ("ID_INPUT_MOUSE", "ID_INPUT_TOUCHPAD", "ID_INPUT_TOUCHSCREEN", "ID_INPUT_POINTINGSTICK")
 
 
@@ -82,7 +82,7 @@ def kept_back(device: DeviceRecord, node: DeviceNode, match: Mapping[str, str]) 
 
 
 def never_given(device: DeviceRecord, node: DeviceNode) -> str:
-    """Why nobody is given a node, whatever is asked for; empty: who asks for it may have it."""
+    """Why no component is given a node; empty: a component that asks for it may have it."""
     mine = [one for one in device.interfaces if node.interface in ("", one.number)]
     kinds = [one.kind.split(":") for one in mine if one.kind]
     if node.subsystem in _DISKS or any(kind[0] == _STORAGE for kind in kinds):
@@ -117,7 +117,7 @@ def _points(device: DeviceRecord, node: DeviceNode) -> bool:
         kind = one.kind.split(":")
         if node.interface in ("", one.number) and (kind[0], kind[-1]) == (_HID, POINTER):
             return True
-    if node.subsystem not in _HANDS:
+    if node.subsystem not in _INPUT_SUBSYSTEMS:
         return False
     beside = (other for other in device.nodes if other.interface == node.interface)
     return any(other.properties.get(name) == "1" for other in beside for name in _POINTS)

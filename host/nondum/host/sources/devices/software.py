@@ -56,6 +56,6 @@ class Software:
 
 
 def unused(snapshot: Snapshot, among: Iterable[str]) -> list[DeviceRecord]:
-    """The devices that nobody has, of those whose ids are given."""
+    """The devices that no component has, of those whose ids are given."""
     held, wanted = claims_by_device(snapshot), set(among)
     return [d for d in snapshot.devices if d.id in wanted and d.id not in held]

@@ -17,7 +17,7 @@ from nondum.sdk.errors import Problem
 
 Accepts = Callable[[pyudev.Device], bool]
 Known = tuple[str, str]
-"""A drive's name, and its file system: one that is formatted anew is told anew."""
+"""A drive's name, and its file system: a drive that is formatted again is told again."""
 
 SYSFS = Path("/sys")
 MARKS = ("ID_SERIAL", "PARTN", "ID_FS_UUID")
@@ -63,7 +63,7 @@ class BlockSource:
         """sysfs path → drive."""
         self._left_alone: dict[str, str] = {}
         """sysfs path → what was told of once, and is none of this host's drives until it is
-        plugged in anew."""
+        plugged in again."""
 
     async def watch(self, emit: Emit) -> None:
         """Tell what is there, then what comes and goes, until cancelled."""

@@ -1,4 +1,4 @@
-"""A source whose drives are told once they stay: a bad cable plugs and unplugs ten times a second.
+"""Debounces a drive source: a bad cable plugs and unplugs a drive ten times a second.
 
 The first times are told at once, since people wait. A port where drives came and went a few times
 within seconds is made to wait longer each time, until one stays.
@@ -18,7 +18,7 @@ from nondum.sdk.errors import Problem
 SHORT_STAY_S = 3.0
 """A drive that was in for less has flapped."""
 FREE_FLAPS = 3
-"""So many are borne without a word."""
+"""After this many, the next drive at a port has to wait, and `DriveFlapping` is told."""
 FIRST_WAIT_S, MOST_WAIT_S = 1.0, 16.0
 """What a drive has to stay, at first and at most; it doubles with each flap."""
 FORGIVEN_S = 30.0

@@ -1,4 +1,4 @@
-"""Which disks are whose: for people who wonder why one is read, or is not."""
+"""Which disk is used by what: tells people why a disk is read as a drive, or is not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nondum.host.sandbox.helper.system_disks import Use
 SECTOR = 512
 """What sysfs counts sizes in, whatever the disk does."""
 
-_FREE = Use("nobody else needs it", is_own=False)
+_FREE = Use("nothing else uses it", is_own=False)
 _FIXED = Use("it does not hang on USB")
 _DIVIDED = "each of its partitions is a drive"
 
@@ -24,10 +24,10 @@ class Owner(Enum):
     HOST = "host"
     """The machine itself: never touched."""
     SOMEBODY = "somebody"
-    """Whoever mounted it: not read as long as it is."""
+    """Another user or program, which mounted it: not read as long as it is mounted."""
     DRIVE = "drive"
     """This host reads it as a drive."""
-    NOBODY = ""
+    NONE = ""
     """It is no drive as a whole: its partitions may be."""
 
 
@@ -54,5 +54,5 @@ def disks(machine: Machine, ours: Path) -> Iterator[Disk]:
             owner, why = Owner.HOST if use.is_own or not is_usb else Owner.SOMEBODY, use.why
             if use is _FREE:
                 is_divided = block.name in divided
-                owner, why = (Owner.NOBODY, _DIVIDED) if is_divided else (Owner.DRIVE, use.why)
+                owner, why = (Owner.NONE, _DIVIDED) if is_divided else (Owner.DRIVE, use.why)
             yield Disk(block.name, size * SECTOR, is_usb, owner, why)

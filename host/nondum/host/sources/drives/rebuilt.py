@@ -1,4 +1,4 @@
-"""Slots whose payloads are written anew while they are plugged in, and slots whose folder goes.
+"""Finds slots whose payloads are built again while they are plugged in, or whose folder goes.
 
 An author builds into the folder that is plugged in. What is there is looked at in a thread, for the
 entry may be a disk that hangs; such a one keeps others from being looked at again, and nothing else
@@ -49,7 +49,7 @@ class RebuiltFolders(Generic[_Slot]):
         self._is_looking = self._is_wanted = self._is_closed = False
 
     def look(self, slots: Mapping[_Slot, Path]) -> None:
-        """Look at slots, to tell of those that were written anew since they were first asked for,
+        """Look at slots, to tell of those that were written again since they were first asked for,
         or looked at last.
 
         Returns at once. What is asked for while it looks is put off: `changed` is set then.
@@ -63,7 +63,7 @@ class RebuiltFolders(Generic[_Slot]):
             for slot in gone:
                 del self._since_ns[slot]
                 self._marks.pop(slot, None)
-            self._watch_anew()
+            self._renew_watches()
         if slots:
             self._is_looking = True
             loop, watches = asyncio.get_running_loop(), self._watches
@@ -79,7 +79,7 @@ class RebuiltFolders(Generic[_Slot]):
                 log.warning("slots are not looked at for what was built into them: %s", error)
                 self._is_looking = False
 
-    def _watch_anew(self) -> None:
+    def _renew_watches(self) -> None:
         """Let go of all watches: some are of what has gone."""
         try:
             fresh = Watches(self._changed)

@@ -1,7 +1,7 @@
 """Slots: folders whose entries, real folders or symlinks, stand for drives.
 
 Put an entry there by rename or as a symlink, so that it is whole the moment it appears. One that is
-written anew where it is, as `payload build` does, is told as inserted again, without having been
+written again where it is, as `payload build` does, is told as inserted again, without having been
 removed. What mounts drives by their labels lets strangers name entries: names that cannot be shown
 are not read.
 """

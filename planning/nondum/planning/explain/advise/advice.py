@@ -18,9 +18,9 @@ from nondum.sdk.errors import FragmentRefused, GoalRefused
 from nondum.sdk.planner import GroundTask, Plan
 
 WAYS_LIMIT = 20
-"""So many alternatives are told."""
+"""Alternatives that are told, at most."""
 TRIALS_LIMIT = 300
-"""So many sets of payloads are planned for."""
+"""Sets of payloads that are planned for, at most."""
 
 
 @dataclass(frozen=True, slots=True)

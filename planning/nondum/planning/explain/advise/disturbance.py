@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from nondum.planning.explain.advise.relevance import Sketch, sketch_of
-from nondum.planning.ground.schema_relevance import concern
+from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.claims import claims_of
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.domain import DerivedRule, Merged
@@ -24,7 +24,7 @@ def disturbers(
 ) -> frozenset[int]:
     """Those of the numbered payloads without which there may be a plan although with all of them
     there is none. Empty: no part of them can do what all of them cannot."""
-    part = concern(merged, goal).merged
+    part = relevant_part(merged, goal).merged
     sensitive, types = _sensitive(part, goal)
     graph = merged.domain.types
 

@@ -73,7 +73,7 @@ class Enumeration:
         return disturbers(trial.merged, trial.goal, numbered)
 
     def _minimised(self, chosen: Chosen) -> Chosen:
-        """A possible set none of whose members can be left out; first whom the plan never uses."""
+        """A possible set that needs all its members; those that the plan never uses go first."""
         kept = self._used(chosen)
         for number in sorted(kept, reverse=True):
             if number in kept and self._is_possible(kept - {number}):

@@ -1,8 +1,8 @@
 """Which payloads a goal can have to do with at all, before anything is merged.
 
-Backwards from the goal: whatever gives what is asked for asks for its own conditions, whoever
-brings it. Words are compared by name, without arguments: what is left out cannot help, what is
-kept may.
+Backwards from the goal: whatever gives what is asked for asks for its own conditions, whichever
+payload brings it. Words are compared by name, without arguments: what is left out cannot help, what
+is kept may.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def _graph(sketches: Iterable[Sketch]) -> TypeGraph:
 
 
 def _of_action(action: Action) -> Schema:
-    """The actor is a unit of its own plugin: no other component can play it."""
+    """The actor is a unit of the same plugin: no other component can play it."""
     gives = {(atom.predicate, True) for atom in action.effect.added()}
     gives |= {(atom.predicate, False) for atom in action.effect.deleted()}
     asks = set(_wishes(action.precondition))

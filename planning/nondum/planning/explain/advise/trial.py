@@ -82,7 +82,7 @@ class Trials:
         return self._known[chosen]
 
     def contributions(self, number: int) -> tuple[Contribution, ...]:
-        """What a candidate brings; whoever is here takes precedence over it."""
+        """What a candidate brings; components that are here take precedence over it."""
         return self._contributions[number]
 
     def has_conflict(self, chosen: Chosen) -> bool:
@@ -221,13 +221,13 @@ class Trials:
 
 
 def _owned_by(origins: Iterable[Origin], owners: Mapping[str, set[int]]) -> set[int]:
-    """The candidates that say something which nobody says who is here."""
+    """The candidates that say something which no component says that is here."""
     brought = [owners.get(f" {origin.component}", set()) for origin in origins]
     return set().union(*brought) if all(brought) else set()
 
 
 def _said_by(merged: Merged, components: Iterable[str]) -> Iterator[str]:
-    """The facts that some components' fragments say, whoever else said so before."""
+    """The facts that some components' fragments say, whether or not others said so before."""
     wanted = frozenset(components)
     for text, origins in merged.init.items():
         if any(origin.component in wanted for origin in origins):

@@ -2,8 +2,8 @@
 
     find("WHEEL_BOMB").remedy
 
-Each is declared once, in the module of its area, whichever room of nondum tells it; a test compares
-them with the sources. They are read only when somebody is told of a problem.
+Each is declared once, in the module of its area, whichever package of nondum raises it; a test
+compares them with the sources. They are imported only when a problem is shown to a person.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cache
 from importlib import import_module
 
 from nondum.sdk.codes.code import Code
+from nondum.sdk.codes.former import FORMER
 
 AREAS = (
     "drives",
@@ -51,15 +52,17 @@ def every() -> Mapping[str, Code]:
 
 
 def find(name: str) -> Code | None:
-    """What is known of a code; None when nobody knows it.
+    """The declaration of a code, also by its former name; None when no area declares it.
 
     >>> find("DISK_FULL").meaning
     'There is too little disk.'
+    >>> find("E-TYPE").name
+    'PDDL_TYPE'
     """
-    return every().get(name)
+    return every().get(FORMER.get(name, name))
 
 
 def remedy(name: str) -> str:
     """What a problem of a code tells to do when it says nothing itself; may be empty."""
-    code = every().get(name)
+    code = find(name)
     return code.remedy if code and code.is_told else ""

@@ -19,7 +19,7 @@ CODES = (
         "CGROUP_MEMORY_MISSING",
         "This system does not limit the memory of groups of processes.",
         "on a Raspberry Pi, put cgroup_enable=memory into /boot/firmware/cmdline.txt and "
-        "start anew",
+        "restart it",
     ),
     Code(
         "CGROUP_PIDS_MISSING",
@@ -54,8 +54,9 @@ CODES = (
     ),
     Code(
         "HELPER_REFUSED",
-        "The helper does not do that, or not for whoever asked.",
-        "this is for nondum's own daemon: report it, if that was the one who asked",
+        "The helper does not do that, or not for the process that asked.",
+        "only nondum's own daemon may use the helper: report it, if the daemon was the one that "
+        "asked",
     ),
     Code(
         "HELPER_SILENT",

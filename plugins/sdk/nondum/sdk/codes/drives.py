@@ -14,7 +14,7 @@ CODES = (
     Code(
         "CHILD_LIMIT",
         "Reading or judging took more than it may use.",
-        "get the payload anew from whoever built it; an honest one needs far less",
+        "get the payload again from its author; an honest one needs far less",
         causes=("a payload that was made to exhaust its reader; a very slow machine"),
     ),
     Code(
@@ -82,7 +82,7 @@ CODES = (
     Code(
         "FS_ERROR",
         "The drive's file system cannot be mounted.",
-        "check the drive on another computer, or format it anew and copy the payload to it again",
+        "check the drive on another computer, or format it and copy the payload to it again",
         causes=("it was pulled while it was being written; it is worn out"),
     ),
     Code(
@@ -123,7 +123,7 @@ CODES = (
         "PATH_UNSAFE",
         "A path leaves the payload, or ends at or leads through anything but plain files "
         "and folders.",
-        "do not use this drive; get the payload anew from whoever built it",
+        "do not use this drive; get the payload again from its author",
         causes=("a link in a payload folder; a payload that was made to do harm"),
     ),
     Code(

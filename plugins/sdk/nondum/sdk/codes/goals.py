@@ -5,7 +5,7 @@ from nondum.sdk.codes.code import Code
 AREA = "Goals and plans"
 CODES = (
     Code(
-        "GOAL_AMISS",
+        "GOAL_FORM",
         "A goal is given neither in words nor in PDDL.",
         "say what is wanted: `nondum goal WORDS`, or --pddl",
     ),
@@ -91,7 +91,7 @@ CODES = (
     ),
     Code(
         "PLAN_STEP_UNKNOWN",
-        "A planner's plan has a step that nobody offers.",
+        "A planner's plan has a step that no component offers.",
         "nothing: it is not used; tell the planner's author",
     ),
     Code(
@@ -121,7 +121,7 @@ CODES = (
     ),
     Code(
         "TRANSLATION_UNCONFIRMED",
-        "Nobody said that the words were understood rightly.",
+        "No one confirmed that the words were understood rightly.",
         "give --yes to take it so, or the goal with --pddl",
     ),
     Code(

@@ -22,7 +22,7 @@ CODES = (
     Code(
         "CATALOGUE_UNWRITTEN",
         "The catalogue cannot be written, so what happens now may be forgotten at the next start.",
-        "see to it that the disk works and has room; it is tried again all the time",
+        "see to it that the disk works and has free space; nondum keeps trying",
     ),
     Code(
         "CATALOGUE_VERSION",
@@ -121,7 +121,7 @@ CODES = (
     ),
     Code(
         "INTERNAL",
-        "Something went wrong that nobody foresaw: a mistake in nondum or in a plugin.",
+        "An unexpected error: a mistake in nondum or in a plugin.",
         "see the log, and report it with what it says",
     ),
     Code(
@@ -148,7 +148,7 @@ CODES = (
     Code(
         "STATE_UNWRITABLE",
         "The state folder cannot be used.",
-        "see to it that the disk works, has room, and that this user may write there",
+        "see to it that the disk works, has free space, and that this user may write there",
     ),
     Code(
         "USAGE",

@@ -140,7 +140,7 @@ CODES = (
     Code(
         "USB_LIBRARY",
         "A plugin cannot use a USB device itself: pyusb or libusb is not to be had.",
-        "its author: lock pyusb with it (`nondum-sdk[usb]`); whoever runs the host: install libusb "
+        "its author: lock pyusb with it (`nondum-sdk[usb]`); the host's owner: install libusb "
         "(Debian: `libusb-1.0-0`)",
     ),
     Code(

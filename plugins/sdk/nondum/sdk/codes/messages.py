@@ -81,8 +81,8 @@ CODES = (
     ),
     Code(
         "PACKET_DESCRIPTORS",
-        "A packet carries open files that nobody asked for.",
-        "tell whoever made the program at the other end",
+        "A packet carries open files that the protocol does not allow there.",
+        "tell the author of the program at the other end",
     ),
     Code(
         "PACKET_FIELDS",
@@ -97,23 +97,23 @@ CODES = (
     Code(
         "PACKET_MALFORMED",
         "A packet cannot be read.",
-        "use the same version of nondum at both ends; else tell whoever made the program at "
+        "use the same version of nondum at both ends; else tell the author of the program at "
         "the other end",
     ),
     Code(
         "PACKET_TOO_DEEP",
         "A packet is nested too deeply.",
-        "tell whoever made the program at the other end",
+        "tell the author of the program at the other end",
     ),
     Code(
         "PACKET_TOO_LONG",
         "A packet is longer than may be sent.",
-        "tell whoever made the program at the other end",
+        "tell the author of the program at the other end",
     ),
     Code(
         "PACKET_VALUE",
         "A packet holds a number that is none.",
-        "tell whoever made the program at the other end",
+        "tell the author of the program at the other end",
     ),
     Code(
         "SLOT_HOLES",
@@ -152,7 +152,7 @@ CODES = (
     ),
     Code(
         "STREAM_ENDED",
-        "A stream has ended: whoever sent it is gone.",
+        "A stream has ended: its source is gone.",
         "plug its source in again; it is connected by itself then",
     ),
     Code(
@@ -187,12 +187,12 @@ CODES = (
     ),
     Code(
         "STREAM_TYPE",
-        "A stream is of another type than whoever reads it expects.",
+        "A stream is of another type than its reader expects.",
         "choose another source with `nondum streams`, or tell the plugin's author",
     ),
     Code(
         "STREAM_UNCLAIMED",
-        "Nobody came for a stream that was asked for.",
+        "A host asked for a stream, and then did not connect to it in time.",
         "ask again; look at the network between the hosts",
     ),
     Code(

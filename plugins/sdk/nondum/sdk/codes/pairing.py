@@ -22,7 +22,7 @@ CODES = (
     Code(
         "CERTIFICATE_NAME",
         "The certificate calls this host by another name.",
-        "have it signed anew, or change `name` under [host]",
+        "have it signed again, or change `name` under [host]",
     ),
     Code(
         "CERTIFICATE_SIGNATURE",
@@ -32,7 +32,7 @@ CODES = (
     Code(
         "CERTIFICATE_TIME",
         "The certificate does not hold now.",
-        "look at this host's clock, then have the certificate issued anew",
+        "look at this host's clock, then have the certificate issued again",
     ),
     Code(
         "CERTIFICATE_VALIDITY",
@@ -47,7 +47,7 @@ CODES = (
     Code(
         "FILE_OPEN_TO_OTHERS",
         "Other users could read or change a secret key, so it proves nothing any more.",
-        "make it anew, or, if nobody else has used this machine, `chmod 600` it",
+        "make a new key, or, if no one else has used this machine, `chmod 600` it",
     ),
     Code(
         "FLEET_EXISTS",
@@ -72,7 +72,7 @@ CODES = (
     Code(
         "KEY_REVOKED",
         "This key was revoked.",
-        "give the host a new key, and pair it or have its certificate issued anew",
+        "give the host a new key, and pair it or have its certificate issued again",
     ),
     Code(
         "KEY_UNKNOWN",
@@ -82,12 +82,12 @@ CODES = (
     Code(
         "PAIRING_BROKEN",
         "The other end does not pair as nondum does.",
-        "begin anew; if it breaks again, run the same version of nondum on both hosts",
+        "begin again; if it breaks again, run the same version of nondum on both hosts",
     ),
     Code(
         "PAIRING_BUSY",
         "The other host is being paired with another one.",
-        "wait until that is done, and begin anew",
+        "wait until that is done, and begin again",
     ),
     Code(
         "PAIRING_CODE",
@@ -98,7 +98,7 @@ CODES = (
     Code(
         "PAIRING_COMMITMENT",
         "The other end changed what it had promised.",
-        "begin anew over a network that you trust: somebody may be between the two hosts",
+        "begin again over a network that you trust: somebody may be between the two hosts",
     ),
     Code(
         "PAIRING_DEVELOPMENT",
@@ -108,7 +108,7 @@ CODES = (
     Code(
         "PAIRING_KEY",
         "Another host speaks than the one that began.",
-        "begin anew over a network that you trust",
+        "begin again over a network that you trust",
     ),
     Code(
         "PAIRING_NAME",
@@ -123,7 +123,7 @@ CODES = (
     Code(
         "PAIRING_ORDER",
         "Pairing went out of turn.",
-        "begin anew with `nondum peers pair` on both hosts",
+        "begin again with `nondum peers pair` on both hosts",
     ),
     Code(
         "PAIRING_OVER",
@@ -133,17 +133,17 @@ CODES = (
     Code(
         "PAIRING_PROOF",
         "The other end agreed to something else.",
-        "begin anew over a network that you trust: somebody may be between the two hosts",
+        "begin again over a network that you trust: somebody may be between the two hosts",
     ),
     Code(
         "PAIRING_REFUSED",
         "Somebody said no.",
-        "begin anew, if that was a mistake",
+        "begin again, if that was a mistake",
     ),
     Code(
         "PAIRING_TRIES",
-        "Too many tries have failed: somebody may be between the two hosts.",
-        "begin anew on both hosts, over a network that you trust",
+        "Too many attempts have failed: somebody may be between the two hosts.",
+        "begin again on both hosts, over a network that you trust",
     ),
     Code(
         "PAIRING_UNWANTED",
@@ -153,6 +153,6 @@ CODES = (
     Code(
         "PAIRING_VANISHED",
         "The other host went away while it was being paired.",
-        "look whether it is on, and begin anew",
+        "look whether it is on, and begin again",
     ),
 )

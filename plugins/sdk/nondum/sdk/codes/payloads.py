@@ -154,7 +154,7 @@ CODES = (
     ),
     Code(
         "TARGET_UNKNOWN",
-        "Nobody builds wheels for such an architecture or Python.",
+        "There are no wheels for such an architecture or Python.",
         "say one that is listed in the message, as in --arch aarch64 --python 3.11",
     ),
     Code(

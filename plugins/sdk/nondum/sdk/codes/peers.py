@@ -68,7 +68,7 @@ CODES = (
     Code(
         "HINT_CROWDED",
         "More hosts are announced than are remembered.",
-        "look who announces so many; name those that matter in `peers.static`",
+        "look which machine announces that many; name the hosts that matter in `peers.static`",
     ),
     Code(
         "HINT_MALFORMED",
@@ -98,7 +98,7 @@ CODES = (
     Code(
         "IDENTITY_DUPLICATE",
         "Another host has this host's key.",
-        "one of the two is a copy: take the key file away there, and start it anew",
+        "one of the two is a copy: delete the key file there, and start that host again",
     ),
     Code(
         "LINKS_DIED",
@@ -119,7 +119,7 @@ CODES = (
     ),
     Code(
         "MULTICAST_MEMBERSHIPS",
-        "The system does not let one program listen on so many interfaces.",
+        "The system limits on how many interfaces one program may listen, and this host has more.",
         "raise net.ipv4.igmp_max_memberships with sysctl, as the message says",
     ),
     Code(
@@ -139,7 +139,7 @@ CODES = (
     ),
     Code(
         "PEERS_FOLDER",
-        "It cannot be kept whom this host trusts.",
+        "The list of the hosts that this one trusts cannot be saved.",
         "look at the disk, and at `state` under [host]",
     ),
     Code(
@@ -165,7 +165,7 @@ CODES = (
     Code(
         "PEER_DUPLICATE",
         "Two hosts share one key, or an old connection came late.",
-        "give the copied host keys of its own, if there are two",
+        "give the copied host new keys, if there are two",
     ),
     Code(
         "PEER_ENDLESS",
@@ -204,7 +204,7 @@ CODES = (
     ),
     Code(
         "PEER_SILENT",
-        "Nobody answers there.",
+        "No host answers there.",
         "look whether the other host is on, and at firewalls between",
     ),
     Code(
@@ -219,7 +219,7 @@ CODES = (
     ),
     Code(
         "PEER_UNKNOWN",
-        "Nobody is known by that name.",
+        "No host is known by that name.",
         "see `nondum peers`; a host that is not here can be named by its whole key",
     ),
     Code(
@@ -269,7 +269,7 @@ CODES = (
     ),
     Code(
         "STATIC_SILENT",
-        "Nobody answers at an address of `peers.static`.",
+        "No host answers at an address of `peers.static`.",
         "look whether nondum runs there, and whether its UDP and TCP ports are open",
     ),
     Code(
@@ -280,12 +280,12 @@ CODES = (
     Code(
         "ZAP_INEFFECTIVE",
         "Keys that must be turned away were let in, so this host does not listen.",
-        "look for another ZeroMQ authenticator in this process, and start nondum anew",
+        "look for another ZeroMQ authenticator in this process, and restart nondum",
     ),
     Code(
         "ZAP_TAKEN",
         "Something else decides who may link to this process.",
-        "look for another ZeroMQ authenticator in this process, and start nondum anew",
+        "look for another ZeroMQ authenticator in this process, and restart nondum",
     ),
     Code(
         "ZENOH_MISSING",

@@ -17,7 +17,7 @@ CODES = (
     Code(
         "ID_OWNED_BY",
         "Payloads of this id belong to somebody else's keys.",
-        "have it signed by whoever owns the id, or build it under an id of your own",
+        "have it signed by the owner of the id, or build it under another id",
     ),
     Code(
         "KEY_EXISTS",
@@ -31,13 +31,13 @@ CODES = (
     ),
     Code(
         "PERMISSION_DENIED",
-        "The payload asks for more than whoever signed it may give.",
+        "The payload asks for more permissions than its signer may give.",
         "leave the permission out of payload.toml, or add it to that role in the trust file",
     ),
     Code(
         "RELEASE_CONFLICT",
         "Two different payloads claim to be the same release.",
-        "find out which is genuine; whoever changes a payload gives it a higher release",
+        "find out which is genuine; give a changed payload a higher release",
     ),
     Code(
         "RELEASE_JUMP",
@@ -59,7 +59,7 @@ CODES = (
     Code(
         "SIG_INVALID",
         "The signature does not fit the contents list.",
-        "the list was changed after it was signed: get the payload anew, or sign it again",
+        "the list was changed after it was signed: get the payload again, or sign it again",
         causes=("somebody has changed the payload; it was built again and not signed again"),
     ),
     Code(
@@ -108,7 +108,7 @@ CODES = (
     Code(
         "TRUST_CONFLICT",
         "There are two different trust files of one version, both signed.",
-        "find out which is genuine before any is used: a root key may be in wrong hands",
+        "find out which is genuine before any is used: a root key may be stolen",
     ),
     Code(
         "TRUST_ELSEWHERE",
@@ -135,7 +135,7 @@ CODES = (
     Code(
         "TRUST_OWNER",
         "The trust file is another owner's.",
-        "use the one of this robot's owner; to change the owner, enrol the host anew",
+        "use the one of this robot's owner; to change the owner, enrol the host again",
     ),
     Code(
         "TRUST_SIGNATURE",
@@ -155,7 +155,7 @@ CODES = (
     ),
     Code(
         "TRUST_UNANCHORED",
-        "There is a trust file on a drive, and this host trusts nobody yet who could vouch for it.",
+        "There is a trust file on a drive, and this host trusts no root key yet to check it with.",
         "compare the fingerprints of its roots with its owner's, then `nondum keys trust FILE`",
     ),
     Code(
@@ -165,7 +165,7 @@ CODES = (
     ),
     Code(
         "TRUST_VERSION",
-        "The trust file does not follow the one that is in force.",
+        "The trust file does not follow the active one.",
         "bring the versions in between, one after the other",
     ),
     Code(

@@ -37,7 +37,7 @@ CODES = (
     Code(
         "WHEEL_MACHINE",
         "A module in the wheel is machine code for another processor than the wheel's name says.",
-        "get the payload anew; its author builds the wheel on the machine that it is for, or "
+        "get the payload again; its author builds the wheel on the machine that it is for, or "
         "names it for the one that it was built on",
         causes=("a wheel that was cross-built with the wrong compiler, or renamed"),
     ),
@@ -45,7 +45,7 @@ CODES = (
         "WHEEL_METADATA",
         "What the wheel says of itself is missing, cannot be read, or is of another "
         "distribution, version or machine than its name says.",
-        "get the payload anew; its author makes the wheel again under its own name (`python "
+        "get the payload again; its author makes the wheel again under its own name (`python "
         "-m build`, `wheel tags`)",
         causes=("the file was renamed; a wheel that was made to be taken for another"),
     ),
@@ -59,7 +59,7 @@ CODES = (
     Code(
         "WHEEL_RECORD",
         "The wheel does not hold what its own list, RECORD, says.",
-        "get the payload anew; its author makes the wheel again instead of changing files in it",
+        "get the payload again; its author makes a new wheel instead of changing files in it",
         causes=("a file was changed after the wheel was made; the stick is failing"),
     ),
     Code(
@@ -79,8 +79,8 @@ CODES = (
     Code(
         "WHEEL_STRUCTURE",
         "Two readers of the wheel would not see the same in it, or it is no wheel.",
-        "get the payload anew from whoever built it; its author makes the wheel again with "
-        "current tools (`python -m build`)",
+        "get the payload again from its author, who makes a new wheel with current tools "
+        "(`python -m build`)",
         causes=(
             "a damaged file; a self-extracting or patched archive; a wheel that was made to "
             "show one thing and install another"

@@ -20,6 +20,11 @@ CODES = (
         "tell the plugin's author",
     ),
     Code(
+        "BEHAVIOUR_BLOCKED",
+        "A leaf of the system tree cannot run its behaviour: no objects meet its preconditions.",
+        "see `nondum facts` for what holds, and the action in the plugin's fragment",
+    ),
+    Code(
         "BEHAVIOUR_FAILED",
         "A behaviour ended in failure, as its author says.",
         "see `nondum why` and what the message says; the robot looks for another way by itself",
@@ -47,7 +52,7 @@ CODES = (
     Code(
         "CALL_TWICE",
         "A call has the number of one that is still running.",
-        "tell whoever made the program at the other end",
+        "tell the author of the program at the other end",
     ),
     Code(
         "CONDITION_RAISED",
@@ -206,12 +211,12 @@ CODES = (
     ),
     Code(
         "UNKNOWN_CALL",
-        "An answer came to a call that nobody made.",
-        "tell whoever made the program at the other end",
+        "An answer came to a call that was never made.",
+        "tell the author of the program at the other end",
     ),
     Code(
         "VALUE_UNKNOWN",
-        "The plugin asks for a value that nobody has told.",
+        "The plugin asks for a value that no component has told.",
         "see `nondum facts`; what tells it may not be plugged in",
     ),
     Code(

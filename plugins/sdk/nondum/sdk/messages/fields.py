@@ -50,7 +50,7 @@ class Message:
     def from_wire(cls, header: Mapping[str, Any], buffer: Buffer | None = None) -> Self:
         """Check what came over a wire and make the message of it.
 
-        The message keeps `buffer` as it is: whoever passes a view answers for its life.
+        The message keeps `buffer` as it is: a caller that passes a view keeps its memory alive.
         Raises `MessageInvalid` (MESSAGE_FIELD for a wrong type, MESSAGE_VALUE for a wrong value).
         """
         try:

@@ -78,7 +78,7 @@ class KeyValue:
 
 @dataclass(frozen=True, slots=True)
 class KeyValues(Message):
-    """Values by name (diagnostic_msgs/DiagnosticStatus): what has no message type of its own."""
+    """Values by name (diagnostic_msgs/DiagnosticStatus), where no other message type fits."""
 
     TYPE: ClassVar[str] = "key-values"
     header: Header

@@ -1,7 +1,7 @@
-"""Sockets to other hosts in a process of their own, and what the daemon and it say to each other.
+"""Sockets to other hosts in a separate process, and the packets between the daemon and it.
 
-What other hosts send before anybody can bound it fills the memory of that process, which has a
-limit. Packets are lists of plain data, over a pair of SOCK_SEQPACKET sockets. NUMBER is that of a
+What other hosts send before it can be bounded fills the memory of that process, which has a limit.
+Packets are lists of plain data, over a pair of SOCK_SEQPACKET sockets. NUMBER is that of a
 connection: even where the process accepted it, odd where the daemon dialled.
 
     daemon → process   trust PIECE IS_LAST            the text of a trust file

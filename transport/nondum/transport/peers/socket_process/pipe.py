@@ -37,15 +37,15 @@ class Pipe:
         on_packet: Callable[[Any], None],
         on_closed: Callable[[ProtocolViolation | None], None],
         most_waiting: int,
-        on_room: Callable[[], None] = lambda: None,
+        on_drained: Callable[[], None] = lambda: None,
     ) -> None:
         """Own `sock` and begin to read, on the running loop.
 
         `on_packet` may raise `ProtocolViolation`, which closes the pipe. `on_closed` is called once
-        when the other end is gone (None) or broke the protocol, not after `close`; `on_room` when
-        nothing waits any more after it was crowded, by more than `most_waiting` bytes.
+        when the other end is gone (None) or broke the protocol, not after `close`; `on_drained`
+        when nothing waits any more after the pipe was crowded, by more than `most_waiting` bytes.
         """
-        self._on_packet, self._on_closed, self._on_room = on_packet, on_closed, on_room
+        self._on_packet, self._on_closed, self._on_drained = on_packet, on_closed, on_drained
         self._most_waiting = most_waiting
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
@@ -82,7 +82,7 @@ class Pipe:
             self._waiting_bytes -= len(self._waiting.popleft())
         if self._was_crowded:
             self._was_crowded = False
-            self._on_room()
+            self._on_drained()
 
     def _receive(self, data: bytes, _handles: tuple[Handle, ...]) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The process's end: sockets of its own, for the daemon at the other end of the pipe."""
+"""The end of the socket process: its sockets serve the daemon at the other end of the pipe."""
 
 from __future__ import annotations
 
@@ -52,7 +52,11 @@ class Service:
             lambda: self._awake.read(self._loop.time()),
         )
         self._pipe = Pipe(
-            sock, self._on_packet, lambda _: self._end(is_asked=False), MOST_WAITING, self._on_room
+            sock,
+            self._on_packet,
+            lambda _: self._end(is_asked=False),
+            MOST_WAITING,
+            self._on_drained,
         )
 
     async def run(self) -> None:
@@ -141,7 +145,7 @@ class Service:
         if self._pipe.is_crowded and self._here is not None:
             self._here.hold()
 
-    def _on_room(self) -> None:
+    def _on_drained(self) -> None:
         if self._here is not None:
             self._here.release()
 

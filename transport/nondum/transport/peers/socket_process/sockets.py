@@ -1,4 +1,4 @@
-"""The daemon's end: connections that a process of their own holds (see `Sockets`).
+"""The daemon's end: connections that a separate process holds (see `Sockets`).
 
 When that process ends, by its memory limit or else, all connections are over; it is started again,
 and listens where it did.
@@ -328,7 +328,7 @@ class _FarRoute:
             self._apart.forget(self.number)
 
     def taken(self, count: int) -> None:
-        """So many messages were handed on."""
+        """The process has passed on `count` messages."""
         self._untaken = max(0, self._untaken - max(0, count))
 
     def _tell(self, what: str, *more: Any) -> None:

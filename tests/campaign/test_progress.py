@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from tests.campaign.rounds import Limit, Round, Rounds, work_off
+from tests.campaign.progress import Limit, Progress, Round, work_off
 from tests.kit.until import PATIENCE_S
 
 PIECES = ("one", "two", "three")
@@ -22,30 +22,30 @@ class Clock:
         return self.now_s
 
 
-def quiet(_line: str) -> None:
-    """Nobody reads it."""
+def discard(_line: str) -> None:
+    """Drop a line."""
 
 
 def test_it_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    first = Round(tmp_path, PIECES, Limit(None), quiet)
+    first = Round(tmp_path, PIECES, Limit(None), discard)
     first.add("one", passed=True)
-    second = Round(tmp_path, PIECES, Limit(None), quiet)
+    second = Round(tmp_path, PIECES, Limit(None), discard)
     assert list(second.due()) == ["two", "three"]
     assert str(second.progress) == "1 of 3"
 
 
 def test_pieces_that_are_there_no_more_do_not_count(tmp_path: Path) -> None:
-    first = Round(tmp_path, PIECES, Limit(None), quiet)
+    first = Round(tmp_path, PIECES, Limit(None), discard)
     first.add("one", passed=False)
     first.add("two", passed=True)
-    second = Round(tmp_path, ("two", "four"), Limit(None), quiet)
-    assert second.progress == Rounds(2, ("two",), ())
+    second = Round(tmp_path, ("two", "four"), Limit(None), discard)
+    assert second.progress == Progress(2, ("two",), ())
     assert list(second.due()) == ["four"]
 
 
 def test_nothing_begins_once_the_time_is_over(tmp_path: Path) -> None:
     clock = Clock()
-    work = Round(tmp_path, PIECES, Limit(1, clock), quiet)
+    work = Round(tmp_path, PIECES, Limit(1, clock), discard)
     due = work.due()
     assert next(due) == "one"
     clock.now_s += 59.0
@@ -62,14 +62,14 @@ def test_what_failed_is_told_at_the_end(tmp_path: Path) -> None:
     assert work.end() == 1
     assert said[0].endswith("1 of 3  FAILED  one  see there")
     assert said[-2:] == ["FAILED one", "2 of 3 done, 1 failed"]
-    assert Rounds.read(tmp_path) == Rounds(3, ("one", "two"), ("one",))
+    assert Progress.read(tmp_path) == Progress(3, ("one", "two"), ("one",))
 
 
 def test_a_piece_that_is_done_again_counts_once(tmp_path: Path) -> None:
-    work = Round(tmp_path, PIECES, Limit(None), quiet)
+    work = Round(tmp_path, PIECES, Limit(None), discard)
     work.add("one", passed=False)
     work.add("one", passed=True)
-    assert work.progress == Rounds(3, ("one",), ())
+    assert work.progress == Progress(3, ("one",), ())
     assert work.end() == 0
 
 

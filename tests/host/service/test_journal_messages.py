@@ -11,10 +11,10 @@ from tests.host.lifecycle.states import active, component
 from nondum.host.core import events
 from nondum.host.core.events import Event
 from nondum.host.core.state import HostState
-from nondum.host.service.telling import Telling
+from nondum.host.service.journal_messages import JournalMessages
 from nondum.sdk.errors import Problem
 
-FULL = Problem("DISK_FULL", "there is no room")
+FULL = Problem("DISK_FULL", "the disk is full")
 LATE = Problem("WORKER_HUNG", "it does not answer")
 
 
@@ -25,7 +25,7 @@ def told(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
 
 
 def tell(event: Event, state: HostState | None = None) -> None:
-    Telling((state or active()).snapshot).on_event(event)
+    JournalMessages((state or active()).snapshot).on_event(event)
 
 
 def fields(told: pytest.LogCaptureFixture) -> list[tuple[str, str]]:
@@ -47,7 +47,7 @@ def test_refusal_is_found_by_payload_and_by_each_code(told: pytest.LogCaptureFix
     assert "org.x is refused: DISK_FULL" in record.getMessage()
 
 
-def test_what_nobody_is_told_may_still_be_looked_for(told: pytest.LogCaptureFixture) -> None:
+def test_what_is_not_announced_is_logged_all_the_same(told: pytest.LogCaptureFixture) -> None:
     tell(events.DriveInserted("sda1", Path("/mnt"), "block"))
     assert ("NONDUM_DRIVE", "sda1") in fields(told)
     told.clear()
@@ -61,7 +61,7 @@ def test_every_event_with_a_problem_is_told(told: pytest.LogCaptureFixture) -> N
     assert fields(told)[1:] == [("NONDUM_COMPONENT", "eye"), ("NONDUM_CODE", "WORKER_HUNG")]
 
 
-def test_plugins_are_heard_from_warnings_on(told: pytest.LogCaptureFixture) -> None:
+def test_lines_of_plugins_are_logged_from_warnings_on(told: pytest.LogCaptureFixture) -> None:
     for level in ("info", "stdout", "log"):
         tell(events.WorkerLogged("eye", level, "I see"))
     assert not told.records

@@ -1,4 +1,4 @@
-"""Each wall matters: without it, and only without it, a hostile plugin gets somewhere."""
+"""Each restriction matters: without it, and only without it, a hostile plugin gets somewhere."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ pytestmark = pytest.mark.anyio
 
 BWRAP = shutil.which("bwrap") or "bwrap"
 
-IN_A_ROOM = {
+IN_A_SANDBOX = {
     "processes": ("see a process of the host", ()),
     "messages": ("attach to shared memory", ()),
     "host name": ("know the host name", ()),
     "network": ("connect by tcp", ()),
     "cgroups": ("know its control group", ()),
     "size of tmp": ("fill tmp", ()),
-    "outside": ("see what the keeper sees", ()),
+    "outside": ("see what init sees", ()),
     "system": ("write among its devices", ()),
     "nodes": ("change the mode of a device of the host", ()),
     "inotify": ("take all instances of inotify", ()),
@@ -52,7 +52,7 @@ IN_A_ROOM = {
     "sockets": ("make an exotic pair", ()),
     "special files": ("leave a set id file", ()),
 }
-"""Wall → what succeeds without it, and walls that must be away too, being in front of it."""
+"""Restriction → what succeeds without it, and restrictions that hide it, to be left out too."""
 
 ON_THE_HOST = {
     "landlock": ("read a file of the host", ("user",)),
@@ -108,7 +108,7 @@ def moved() -> Iterator[str]:
     for line in Path("/proc/self/cgroup").read_text(encoding="ascii").split():
         _, controllers, before = line.split(":", 2)
         root = Path("/sys/fs/cgroup") / (controllers.removeprefix("name=") or ".")
-        own = root / before.lstrip("/") / f"nondum-walls-{os.getpid()}"
+        own = root / before.lstrip("/") / f"nondum-restrictions-{os.getpid()}"
         with contextlib.suppress(OSError):
             own.mkdir(exist_ok=True)
             (own / "cgroup.procs").write_text(str(os.getpid()))
@@ -121,10 +121,10 @@ def moved() -> Iterator[str]:
     yield ""
 
 
-async def test_nothing_of_that_is_possible_in_a_whole_room(
+async def test_nothing_of_that_is_possible_in_a_whole_sandbox(
     tmp_path: Path, bait: dict[str, Any]
 ) -> None:
-    names = [*(name for name, _ in IN_A_ROOM.values()), *LIMITS]
+    names = [*(name for name, _ in IN_A_SANDBOX.values()), *LIMITS]
     assert not await possible(tmp_path, bait, Boxed(BWRAP), names)
 
 
@@ -145,36 +145,38 @@ async def possible(
     return {name for name, result in results.items() if result.could} - unlimited(folder)
 
 
-@pytest.mark.parametrize("wall", IN_A_ROOM)
-async def test_wall_of_a_room_matters(tmp_path: Path, bait: dict[str, Any], wall: str) -> None:
-    name, away = IN_A_ROOM[wall]
-    broken = Boxed(BWRAP, without=(*away, wall))
-    if away:  # else the whole room is what is judged above
+@pytest.mark.parametrize("restriction", IN_A_SANDBOX)
+async def test_restriction_of_a_sandbox_matters(
+    tmp_path: Path, bait: dict[str, Any], restriction: str
+) -> None:
+    name, away = IN_A_SANDBOX[restriction]
+    broken = Boxed(BWRAP, without=(*away, restriction))
+    if away:  # else the whole sandbox is judged above
         assert not await possible(tmp_path / "rest", bait, Boxed(BWRAP, without=away), [name])
     result = (await attempted(tmp_path / "broken", bait, broken, [name]))[name]
-    assert result.could, f"without {wall}: {result.what}"
+    assert result.could, f"without {restriction}: {result.what}"
 
 
-@pytest.mark.parametrize("wall", ON_THE_HOST)
-async def test_wall_of_a_restricted_worker_matters(
-    tmp_path: Path, bait: dict[str, Any], wall: str
+@pytest.mark.parametrize("restriction", ON_THE_HOST)
+async def test_restriction_of_a_restricted_worker_matters(
+    tmp_path: Path, bait: dict[str, Any], restriction: str
 ) -> None:
-    name, away = ON_THE_HOST[wall]
-    broken = Held(without=(*away, wall))
+    name, away = ON_THE_HOST[restriction]
+    broken = Held(without=(*away, restriction))
     if away:
         assert not await possible(tmp_path / "rest", bait, Held(without=away), [name])
     result = (await attempted(tmp_path / "broken", bait, broken, [name]))[name]
-    assert result.could, f"without {wall}: {result.what}"
+    assert result.could, f"without {restriction}: {result.what}"
 
 
-@pytest.mark.parametrize("wall", OF_OLD_LANDLOCK)
-async def test_wall_matters_where_landlock_is_older(
-    tmp_path: Path, bait: dict[str, Any], wall: str
+@pytest.mark.parametrize("restriction", OF_OLD_LANDLOCK)
+async def test_restriction_matters_where_landlock_is_older(
+    tmp_path: Path, bait: dict[str, Any], restriction: str
 ) -> None:
-    names = OF_OLD_LANDLOCK[wall]
+    names = OF_OLD_LANDLOCK[restriction]
     whole = Held(without=["user"], abi=2)
     assert not await possible(tmp_path / "whole", bait, whole, names)
-    broken = Held(without=["user", wall], abi=2)
+    broken = Held(without=["user", restriction], abi=2)
     assert await possible(tmp_path / "broken", bait, broken, names) == set(names)
 
 
@@ -186,9 +188,9 @@ async def test_limit_matters(tmp_path: Path, bait: dict[str, Any], name: str) ->
     assert result.could, result.what
 
 
-def test_every_wall_is_shown_to_matter() -> None:
-    assert set(bubblewrap.NAMESPACES) <= set(IN_A_ROOM)
-    assert set(refusals.GROUPS) <= set(IN_A_ROOM)
+def test_every_restriction_is_shown_to_matter() -> None:
+    assert set(bubblewrap.NAMESPACES) <= set(IN_A_SANDBOX)
+    assert set(refusals.GROUPS) <= set(IN_A_SANDBOX)
     assert set(refusals.WITHOUT_NAMESPACES) <= set(ON_THE_HOST)
     assert set(refusals.WITH_THE_HOSTS_USER) <= set(ON_THE_HOST)
     assert set(refusals.TRUNCATION) <= set(OF_OLD_LANDLOCK)

@@ -1,4 +1,4 @@
-"""What was done of a campaign: its pieces, those that failed, and the time that is left.
+"""Progress of a campaign: the pieces done, those that failed, and the time left.
 
 A round is one time through all pieces. It is kept in a folder, so that a run goes on where the one
 before it stopped.
@@ -18,7 +18,7 @@ FILE = "round.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Rounds:
+class Progress:
     """How far a round is."""
 
     of: int
@@ -42,7 +42,7 @@ class Rounds:
         new.replace(folder / FILE)
 
     @classmethod
-    def read(cls, folder: Path) -> Rounds | None:
+    def read(cls, folder: Path) -> Progress | None:
         """That of a folder; None if nothing was begun there."""
         file = folder / FILE
         if not file.exists():
@@ -99,8 +99,8 @@ class Round:
         self.folder, self.limit = folder, limit
         self.pieces, self._say = pieces, say or _print
         self._lock = threading.Lock()
-        before = Rounds.read(folder) or Rounds(0)
-        self.progress = Rounds(
+        before = Progress.read(folder) or Progress(0)
+        self.progress = Progress(
             len(pieces), _among(before.done, pieces), _among(before.failed, pieces)
         )
         self.progress.write(folder)
@@ -120,7 +120,7 @@ class Round:
             failed = [one for one in self.progress.failed if one != piece]
             if not passed:
                 failed.append(piece)
-            self.progress = Rounds(len(self.pieces), (*others, piece), tuple(failed))
+            self.progress = Progress(len(self.pieces), (*others, piece), tuple(failed))
             self.progress.write(self.folder)
             mark = "passed" if passed else "FAILED"
             more = f"  {note}" if note else ""

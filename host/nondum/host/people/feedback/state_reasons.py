@@ -1,11 +1,11 @@
-"""What a host knows → what of it concerns a person who stands before it. Pure."""
+"""What a host knows → the reasons for the state that it shows to people. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
-from nondum.host.core.feedback_state import Concern, State
+from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.core.records import (
     INSTALLED,
     ComponentState,
@@ -35,12 +35,12 @@ class Known:
     places: Collection[str] = ()
     """Keys of payloads that run on peers."""
     goals: tuple[GivenGoal, ...] = ()
-    more: tuple[Concern, ...] = ()
-    """Concerns of those who know of them by themselves."""
+    more: tuple[StateReason, ...] = ()
+    """State reasons that other parts of the host work out."""
 
 
-def concerns(known: Known) -> tuple[Concern, ...]:
-    """Every reason that there is to show anything but that the host is ready."""
+def state_reasons(known: Known) -> tuple[StateReason, ...]:
+    """All reasons for a state other than READY."""
     found = (
         *(c for payload in known.snapshot.payloads for c in _of_payload(payload, known)),
         *(c for drive in known.snapshot.drives for c in _of_drive(drive, known)),
@@ -52,7 +52,7 @@ def concerns(known: Known) -> tuple[Concern, ...]:
     return tuple(found)
 
 
-def _of_payload(payload: PayloadRecord, known: Known) -> Iterator[Concern]:
+def _of_payload(payload: PayloadRecord, known: Known) -> Iterator[StateReason]:
     about, name = f"payload {payload.key}", payload.payload_id
     if payload.key in known.places:
         return
@@ -63,10 +63,10 @@ def _of_payload(payload: PayloadRecord, known: Known) -> Iterator[Concern]:
         yield refusal(State.HELP, about, told, payload.problems, payload=name)
     elif not is_at_rest(payload):
         doing = "is being removed" if payload.step is Step.REMOVING else "is being installed"
-        yield Concern(State.WORKING, about, f"{name} {doing}", payload=name)
+        yield StateReason(State.WORKING, about, f"{name} {doing}", payload=name)
 
 
-def _of_drive(drive: DriveRecord, known: Known) -> Iterator[Concern]:
+def _of_drive(drive: DriveRecord, known: Known) -> Iterator[StateReason]:
     about = f"drive {drive.id}"
     if drive.kind == INSTALLED:
         return
@@ -74,9 +74,9 @@ def _of_drive(drive: DriveRecord, known: Known) -> Iterator[Concern]:
         told = f"drive {drive.id} cannot be used"
         yield refusal(State.REFUSED, about, told, drive.problems, drive=drive.id)
     elif drive.state is not DriveState.IDLE:
-        yield Concern(State.WORKING, about, f"drive {drive.id} is being read", drive=drive.id)
+        yield StateReason(State.WORKING, about, f"drive {drive.id} is being read", drive=drive.id)
     elif drive.kind in PLUGGED and is_safe(drive, known):
-        yield Concern(State.SAFE, about, _may_be_pulled(drive, known.snapshot), drive=drive.id)
+        yield StateReason(State.SAFE, about, _may_be_pulled(drive, known.snapshot), drive=drive.id)
 
 
 def _may_be_pulled(drive: DriveRecord, snapshot: Snapshot) -> str:
@@ -88,37 +88,39 @@ def _may_be_pulled(drive: DriveRecord, snapshot: Snapshot) -> str:
 
 
 def is_safe(drive: DriveRecord, known: Known) -> bool:
-    """Whether nothing would be lost, or left half done, by pulling a drive now: all that it
-    brought is in force, and it is unmounted."""
+    """Whether a person can pull a drive now without loss: all payloads that it brought are active,
+    and it is unmounted."""
     brought = [p for p in known.snapshot.payloads if drive.id in p.sources]
     return drive.id in known.unmounted and all(payload.step in _WELL for payload in brought)
 
 
-def _of_host(snapshot: Snapshot) -> Iterator[Concern]:
+def _of_host(snapshot: Snapshot) -> Iterator[StateReason]:
     if snapshot.safety is not Safety.OFF:
         told = "the host is in safe mode, and leaves payloads alone"
-        yield Concern(State.HELP, "host", told, "SAFE_MODE")
+        yield StateReason(State.HELP, "host", told, "SAFE_MODE")
 
 
-def _of_components(snapshot: Snapshot) -> Iterator[Concern]:
+def _of_components(snapshot: Snapshot) -> Iterator[StateReason]:
     for component in snapshot.components:
         if component.state is ComponentState.QUARANTINED:
             about, told = f"component {component.id}", f"{component.id} does not work"
             payload = component.payload_id
             yield refusal(State.HELP, about, told, component.problems, payload=payload)
         for problem in waits_for_devices(component):
-            yield Concern(State.HELP, f"component {component.id}", problem.message, problem.code)
+            yield StateReason(
+                State.HELP, f"component {component.id}", problem.message, problem.code
+            )
 
 
 def _cannot_be_had(goal: GivenGoal) -> bool:
     return goal.state is GoalState.SUSPENDED
 
 
-def _of_goal(goal: GivenGoal) -> Concern:
+def _of_goal(goal: GivenGoal) -> StateReason:
     told = f"goal {goal.id} cannot be had now, {goal.text}"
     if goal.problems:
         return refusal(State.HELP, f"goal {goal.id}", told, goal.problems)
-    return Concern(State.HELP, f"goal {goal.id}", f"{told}: {goal.reason}")
+    return StateReason(State.HELP, f"goal {goal.id}", f"{told}: {goal.reason}")
 
 
 def refusal(
@@ -129,10 +131,10 @@ def refusal(
     *,
     payload: str = "",
     drive: str = "",
-) -> Concern:
-    """A concern with what is wrong: the code of the first problem, and what it says."""
+) -> StateReason:
+    """A state reason with the code and the message of the first problem."""
     first = next(iter(problems), None)
     if first is None:
-        return Concern(state, about, told, payload=payload, drive=drive)
+        return StateReason(state, about, told, payload=payload, drive=drive)
     line = first.message.splitlines()[0]
-    return Concern(state, about, f"{told}: {line}", first.code, payload, drive)
+    return StateReason(state, about, f"{told}: {line}", first.code, payload, drive)

@@ -1,4 +1,4 @@
-"""A payload under construction: right in all that is not changed, and cheap to change."""
+"""The files of a payload before they are written: valid, and cheap to change."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Sign = Callable[[bytes], bytes | None]
 
 
 def unsigned(listed: bytes) -> None:
-    """Nobody vouches for it."""
+    """Without a signature."""
     return
 
 
 @dataclass(frozen=True)
-class Draft:
+class PayloadFiles:
     """Files of a payload by path, and what its contents list says of them."""
 
     id: str
@@ -57,21 +57,21 @@ class Draft:
         """A file as text."""
         return self.files[path].decode()
 
-    def with_file(self, path: str, data: bytes | str) -> Draft:
+    def with_file(self, path: str, data: bytes | str) -> PayloadFiles:
         """Another file, or another one in its place; it is listed as it is."""
         written = data.encode() if isinstance(data, str) else data
         return replace(self, files={**self.files, path: written})
 
-    def without(self, path: str) -> Draft:
+    def without(self, path: str) -> PayloadFiles:
         """Without a file, nor a word of it."""
         return replace(self, files={p: data for p, data in self.files.items() if p != path})
 
-    def edited(self, path: str, old: str, new: str) -> Draft:
+    def edited(self, path: str, old: str, new: str) -> PayloadFiles:
         """With other text in a file, which has the old one."""
         assert old in self.text(path), f"{old!r} is not in {path}"
         return self.with_file(path, self.text(path).replace(old, new))
 
-    def with_index(self, change: Callable[[Any], Any]) -> Draft:
+    def with_index(self, change: Callable[[Any], Any]) -> PayloadFiles:
         """With another index, made of the right one."""
         return self.with_file("index.json", json.dumps(change(json.loads(self.text("index.json")))))
 
@@ -112,7 +112,7 @@ LEFT_OUT = "\0"
 """Value of a header that is left out."""
 
 
-def draft(payload_id: str, part: Part | None = None) -> Draft:
+def sound_payload(payload_id: str, part: Part | None = None) -> PayloadFiles:
     """A sound payload with one component, called as the last part of its id."""
     component = payload_id.rpartition(".")[2]
     part = part or plain(component)
@@ -120,7 +120,7 @@ def draft(payload_id: str, part: Part | None = None) -> Draft:
         wheel = _wheel(Path(folder), part)
         lock = lock_text([wheel]).encode()
         described = {part.id: part.index.to_dict()}
-        return Draft(
+        return PayloadFiles(
             payload_id,
             {
                 f"wheels/{wheel.name}": wheel.read_bytes(),

@@ -1,4 +1,4 @@
-"""What is heard, one sentence after the other, whatever it came from.
+"""Recognises sentences, one after the other, from files and from a microphone.
 
 Words change while people speak: a sentence is heard by what could be said when it ended. While this
 machine itself speaks, no sentences are heard, only words that stop.
@@ -23,13 +23,13 @@ from nondum_speech.sound import Sound, SoundInvalid, from_bytes, read_wav
 
 LOOK_S = 0.2
 WAITING = 8
-"""So many sentences may wait for a host that does not ask; then the oldest is forgotten."""
+"""How many sentences wait for a host that does not ask; beyond that the oldest is forgotten."""
 ECHO_BYTES = 16_000
 """Half a second: so long after the own voice has ended, its echo may be heard."""
 
 
-class Ears:
-    """Turns sounds into sentences said; they wait in `sentences`."""
+class SpeechListener:
+    """Turns sounds into sentences, which wait in `sentences`."""
 
     def __init__(
         self, espeak: Espeak, log: logging.Logger, limits: Limits, *, listens_on: bool
@@ -86,7 +86,7 @@ class Ears:
                 await self._hear_stop(piece)
             else:
                 own = None
-                for sentence in cutter.heard(piece):
+                for sentence in cutter.feed(piece):
                     await self._hear(sentence)
 
     @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""Whether a body stands or turns, by what its odometry tells. Pure."""
+"""Whether a body stands still or moves, by its odometry. Pure."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from demo.following import Stamped, unwrapped
 
-STANDING_RAD = math.radians(0.2)
-STANDING_M = 0.01
+STILL_RAD = math.radians(0.2)
+STILL_M = 0.01
 
 Placed = tuple[float, float, float]
 """Seconds, and metres along two axes."""
@@ -25,9 +25,9 @@ class Motion:
     """Between the utmost places, along the axis where that is more."""
 
     @property
-    def is_standing(self) -> bool:
-        """Whether that is as good as nothing."""
-        return self.turned_rad < STANDING_RAD and self.moved_m < STANDING_M
+    def is_still(self) -> bool:
+        """Whether both are as small as noise."""
+        return self.turned_rad < STILL_RAD and self.moved_m < STILL_M
 
     def __str__(self) -> str:
         return f"{math.degrees(self.turned_rad):.2f}° and {100 * self.moved_m:.1f} cm"

@@ -1,4 +1,4 @@
-"""What is heard becomes a goal, an answer, or a sentence on why not."""
+"""Spoken words become a goal, an answer, or a sentence on why not."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nondum.sdk.errors import GoalRefused, Problem
 
 pytestmark = pytest.mark.anyio
 
-LISTENER = "ear"
+LISTENER = "microphone"
 WORDS = "point at the radiation source"
 
 
@@ -26,25 +26,25 @@ async def take(words: str) -> str:
     raise AssertionError(f"a goal is made of {words!r}")
 
 
-async def test_question_that_nobody_answers_is_told_and_no_goal(robot: Robot) -> None:
+async def test_question_without_an_answer_is_told_and_makes_no_goal(robot: Robot) -> None:
     async def answer(words: str) -> str | None:
         raise GoalRefused(Problem("METHOD_UNKNOWN", f"made up for {words}"))
 
     hearing = Conversation(robot.mind, dict, dict, take, answer)
-    await hearing.heard(LISTENER, "mule, what can you do")
+    await hearing.on_words(LISTENER, "mule, what can you do")
     assert any("METHOD_UNKNOWN" in sentence for sentence in told(robot))
 
 
-async def test_answer_is_told_by_whoever_gives_it(robot: Robot) -> None:
+async def test_answer_is_not_told_twice(robot: Robot) -> None:
     async def answer(words: str) -> str | None:
         return "I can blink."
 
     before = told(robot)
-    await Conversation(robot.mind, dict, dict, take, answer).heard(LISTENER, "what can you do")
+    await Conversation(robot.mind, dict, dict, take, answer).on_words(LISTENER, "what can you do")
     assert told(robot) == before
 
 
-async def test_goal_that_is_heard_says_which_it_replaces(robot: Robot) -> None:
+async def test_spoken_goal_says_which_one_it_replaces(robot: Robot) -> None:
     sensing = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
     phrases = tuple(replace(b, phrases=("point at {t}",)) for b in PAN_TILT_UNIT.behaviours)
     robot.plug(sensing, replace(PAN_TILT_UNIT, behaviours=phrases))

@@ -38,7 +38,7 @@ def binds(words: list[str], flag: str) -> set[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("flag", FLAGS)
-def test_room_has_namespaces_of_its_own(flag: str) -> None:
+def test_sandbox_has_its_own_namespaces(flag: str) -> None:
     assert called().count(flag) == 1
 
 
@@ -62,7 +62,7 @@ def test_interpreter_takes_nothing_from_its_environment() -> None:
     assert words[words.index("--") + 2 :][:4] == ["-I", "-S", "-B", "-u"]
 
 
-def test_what_root_could_set_is_sealed_and_the_room_itself_protected() -> None:
+def test_what_root_could_set_is_sealed_and_the_sandbox_itself_protected() -> None:
     assert set(SEALED) == {
         f"/proc/{name}" for name in ("sys", "sysrq-trigger", "irq", "bus", "fs", "acpi")
     }

@@ -1,4 +1,4 @@
-"""Process 1 of a room, and the worker that it starts: what each of them holds."""
+"""Process 1 of a sandbox, and the worker that it starts: what each of them holds."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from nondum.host.sandbox.inside import kernel
 from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
 from nondum.host.workers.init_link import InitLink
 from nondum.host.workers.launcher import parameters
-from nondum.host.workers.spare import ROOM, ROOM_BYTES
+from nondum.host.workers.spare import PLACEHOLDER, PLACEHOLDER_BYTES
 
 pytestmark = pytest.mark.anyio
 BWRAP = shutil.which("bwrap") or "bwrap"
 
 
-async def test_keeper_has_its_system_calls_filtered(tested: WorkersUnderTest) -> None:
+async def test_init_has_its_system_calls_filtered(tested: WorkersUnderTest) -> None:
     await guest(tested, "pass")
-    keeper = parent(tested.workers.pids()["guest"])
-    assert status(keeper)["Seccomp"] == "2"
+    init = parent(tested.workers.pids()["guest"])
+    assert status(init)["Seccomp"] == "2"
 
 
-async def test_keeper_can_do_nothing_but_mount(tested: WorkersUnderTest) -> None:
+async def test_init_can_do_nothing_but_mount(tested: WorkersUnderTest) -> None:
     await guest(tested, "pass")
-    keeper = status(parent(tested.workers.pids()["guest"]))
-    assert keeper["Name"] == "keeper"
+    init = status(parent(tested.workers.pids()["guest"]))
+    assert init["Name"] == "nondum-init"
     for each in ("CapPrm", "CapEff", "CapBnd"):
-        assert int(keeper[each], 16) == 1 << kernel.CAP_SYS_ADMIN
+        assert int(init[each], 16) == 1 << kernel.CAP_SYS_ADMIN
 
 
-async def test_keeper_says_who_it_is_so_that_the_end_of_its_room_is_seen(
+async def test_init_says_who_it_is_so_that_the_end_of_its_sandbox_is_seen(
     tested: WorkersUnderTest,
 ) -> None:
     spec = tested.spec("guest", "")
@@ -51,25 +51,25 @@ async def test_keeper_says_who_it_is_so_that_the_end_of_its_room_is_seen(
         process = await asyncio.create_subprocess_exec(
             *confinement.command(ground, theirs.fileno()),
             pass_fds=[theirs.fileno()],
-            env={ROOM: "-" * ROOM_BYTES},
+            env={PLACEHOLDER: "-" * PLACEHOLDER_BYTES},
         )
         order = json.dumps(parameters(spec, entry, looks=True)).encode()
         socket.send_fds(ours, [order], [far.fileno()])
-        keeper = InitLink(ours)
+        init = InitLink(ours)
         assert await process.wait() == 0
-    pidfd = keeper.take_pidfd()
-    assert keeper.worker is not None
+    pidfd = init.take_pidfd()
+    assert init.worker is not None
     assert pidfd is not None
     os.close(pidfd)
-    keeper.close()
+    init.close()
 
 
-async def test_keeper_holds_neither_the_link_nor_the_output_of_its_worker(
+async def test_init_holds_neither_the_link_nor_the_output_of_its_worker(
     tested: WorkersUnderTest,
 ) -> None:
     await guest(tested, "pass")
-    keeper = parent(tested.workers.pids()["guest"])
-    open_there = list(held_by(keeper).values())
+    init = parent(tested.workers.pids()["guest"])
+    open_there = list(held_by(init).values())
     assert sorted(set(map(kind_of, open_there))) == ["/dev/null", "pipe", "socket"]
     assert sum(kind_of(each) == "socket" for each in open_there) == 1
     assert len({each for each in open_there if kind_of(each) == "pipe"}) == 1, "its own alarm"

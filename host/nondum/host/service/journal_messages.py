@@ -1,4 +1,4 @@
-"""What happens on a host, told to systemd's journal: what people are told, and what is amiss."""
+"""Writes what happens on a host to systemd's journal: announcements to people, and problems."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ LOGGED = {"WARNING": logging.WARNING, "ERROR": logging.ERROR, "CRITICAL": loggin
 log = logging.getLogger("nondum.events")
 
 
-class Telling:
-    """Listens to the bus, and logs."""
+class JournalMessages:
+    """Logs events of the bus to the journal."""
 
     def __init__(self, snapshot: Callable[[], Snapshot]) -> None:
         self._snapshot = snapshot
@@ -53,7 +53,7 @@ class Telling:
 
 
 def _logged(event: Event) -> str:
-    """What nobody needs to be told as it happens, and may look for later."""
+    """The line for an event that is not announced, but that people may look for later."""
     match event:
         case DriveInserted():
             return f"drive {event.drive} was plugged in"

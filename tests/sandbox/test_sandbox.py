@@ -1,4 +1,4 @@
-"""What is in a worker's room: what it was granted, and nothing for longer than that."""
+"""What is in a worker's sandbox: what it was granted, and nothing for longer than that."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ async def test_permission_brings_its_device_nodes(
     assert said.message == "sees ['kmsg']"
 
 
-async def test_what_is_left_in_a_room_is_reaped(tested: WorkersUnderTest) -> None:
+async def test_orphans_in_a_sandbox_are_reaped(tested: WorkersUnderTest) -> None:
     await guest(
         tested,
         "if os.fork() == 0:\n"
@@ -229,8 +229,8 @@ async def test_what_is_left_in_a_room_is_reaped(tested: WorkersUnderTest) -> Non
         "    await ctx.sleep(0.01)",
     )
     assert await does(tested) == ""
-    keeper = parent(tested.workers.pids()["guest"])
-    await until_async("its keeper waits again", lambda: is_at_rest(keeper))
+    init = parent(tested.workers.pids()["guest"])
+    await until_async("its init waits again", lambda: is_at_rest(init))
 
 
 def is_at_rest(pid: int) -> bool:
@@ -238,7 +238,7 @@ def is_at_rest(pid: int) -> bool:
     return all(status(pid)["State"].startswith("S") for _ in range(100))
 
 
-async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
+async def test_sandbox_ends_with_its_worker(tested: WorkersUnderTest) -> None:
     body = (
         "if os.fork() == 0:\n"
         "    os.setsid()\n"
@@ -249,10 +249,10 @@ async def test_room_ends_with_its_worker(tested: WorkersUnderTest) -> None:
     await guest(tested, body)
     tested.behave("guest", "do", u=f"{HOST}__guest__it")
     await tested.until(WorkerLogged, lambda event: event.message.startswith("child"))
-    keeper = parent(tested.workers.pids()["guest"])
-    others = children(keeper)
+    init = parent(tested.workers.pids()["guest"])
+    others = children(init)
     await tested.workers.stop("guest")
-    for pid in (keeper, *others):
+    for pid in (init, *others):
         await until_gone(pid)
 
 
@@ -347,9 +347,9 @@ def test_what_lies_in_its_folders_is_no_device_and_has_no_set_id_bits() -> None:
             text=True,
             check=True,
         )
-    before, in_the_room = told.stdout.splitlines()
+    before, in_the_sandbox = told.stdout.splitlines()
     assert before == "0 opens"
-    assert in_the_room == "65534 does not open"
+    assert in_the_sandbox == "65534 does not open"
 
 
 async def test_worker_may_name_its_user_and_not_leave_its_groups(tested: WorkersUnderTest) -> None:

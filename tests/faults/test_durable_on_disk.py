@@ -1,4 +1,4 @@
-"""What was promised is on disk whatever sync a real file system would have made up for.
+"""What was promised is on disk, even where a real file system would hide a missing sync.
 
 Every promise of tests/faults/promising.py is looked at after every system call, with everything
 lost that was not synced by then; and every sync is left out once.
@@ -24,7 +24,7 @@ def events(tmp_path_factory: pytest.TempPathFactory) -> list[Event]:
     return recorded(folder, command, root / "calls", TMPDIR=str(elsewhere))
 
 
-def test_promises_hold_without_what_was_not_synced(events: list[Event]) -> None:
+def test_what_was_promised_survives_without_unsynced_writes(events: list[Event]) -> None:
     assert broken(events) == []
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import pytest
-from demo.standing import Motion, motion
+from demo.body_motion import Motion, motion
 
 STEP_S = 0.05
 
@@ -18,7 +18,7 @@ def moved(
     begin_s: float = 1.0,
     end_s: float = 5.0,
 ) -> Motion | None:
-    """How a body moves that is heard for six seconds."""
+    """How a body moves whose odometry covers six seconds."""
     stamps = [step * STEP_S for step in range(121)]
     headings = [(t, math.remainder(heading(t), math.tau)) for t in stamps]
     return motion(headings, [(t, x(t), 0.0) for t in stamps], begin_s, end_s)
@@ -27,13 +27,13 @@ def moved(
 def test_body_that_stands_stands() -> None:
     found = moved(lambda t: 1.0)
     assert found is not None
-    assert found.is_standing
+    assert found.is_still
 
 
 def test_braking_before_the_stretch_does_not_count() -> None:
     found = moved(lambda t: min(t, 1.0), lambda t: min(t, 1.0))
     assert found is not None
-    assert found.is_standing
+    assert found.is_still
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_body_that_moves_does_not_stand(
 ) -> None:
     found = moved(heading, x)
     assert found is not None
-    assert not found.is_standing
+    assert not found.is_still
 
 
 def test_turning_past_half_a_turn_is_no_jump() -> None:
@@ -60,6 +60,6 @@ def test_turning_past_half_a_turn_is_no_jump() -> None:
 
 
 @pytest.mark.parametrize(("begin_s", "end_s"), [(-1.0, 5.0), (1.0, 7.0)])
-def test_what_was_not_heard_is_not_judged(begin_s: float, end_s: float) -> None:
+def test_a_stretch_that_odometry_does_not_cover_is_not_judged(begin_s: float, end_s: float) -> None:
     assert moved(lambda t: 0.0, begin_s=begin_s, end_s=end_s) is None
     assert motion([], [], begin_s, end_s) is None

@@ -1,4 +1,4 @@
-"""Which of all that a host knows concerns a person who stands before it."""
+"""The reasons for the state that a host shows, from what it knows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.host.lifecycle.states import component
 
-from nondum.host.core.feedback_state import Concern, State
+from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.core.records import (
     ComponentRecord,
     DriveRecord,
@@ -19,7 +19,7 @@ from nondum.host.core.records import (
     Step,
 )
 from nondum.host.mind.goals import GivenGoal, GoalState
-from nondum.host.people.feedback.concerns import Known, concerns
+from nondum.host.people.feedback.state_reasons import Known, state_reasons
 from nondum.sdk.errors import Problem
 
 UNSIGNED = Problem("SIG_MISSING", "the payload is not signed")
@@ -43,19 +43,19 @@ def known(*payloads: PayloadRecord, drive: DriveRecord = DRIVE, unmounted: bool 
 
 
 def states(known: Known) -> list[State]:
-    return [concern.state for concern in concerns(known)]
+    return [reason.state for reason in state_reasons(known)]
 
 
 def at(step: Step, *problems: Problem) -> PayloadRecord:
     return replace(PAYLOAD, step=step, problems=problems)
 
 
-def test_a_host_without_anything_has_no_concerns() -> None:
-    assert concerns(Known(Snapshot("spot", 1))) == ()
+def test_a_host_without_anything_has_no_state_reasons() -> None:
+    assert state_reasons(Known(Snapshot("spot", 1))) == ()
 
 
-def test_a_drive_whose_payload_is_in_force_may_be_pulled() -> None:
-    [safe] = concerns(known(PAYLOAD))
+def test_a_drive_with_an_active_payload_may_be_pulled() -> None:
+    [safe] = state_reasons(known(PAYLOAD))
     assert (safe.state, safe.drive) == (State.SAFE, "sdb1-7")
 
 
@@ -84,8 +84,8 @@ def test_a_payload_under_way_is_being_worked_on(step: Step) -> None:
 
 
 def test_a_refused_payload_tells_its_code_and_why() -> None:
-    [refused] = concerns(known(at(Step.REFUSED, UNSIGNED)))
-    assert refused == Concern(
+    [refused] = state_reasons(known(at(Step.REFUSED, UNSIGNED)))
+    assert refused == StateReason(
         State.REFUSED,
         "payload k",
         "org.example.eye is refused: the payload is not signed",
@@ -101,7 +101,7 @@ def test_a_payload_that_runs_on_a_peer_is_not_refused_here() -> None:
 
 def test_a_drive_without_a_payload_is_refused() -> None:
     empty = replace(DRIVE, problems=(Problem("DRIVE_NOT_PAYLOAD", "carries no payload"),))
-    [refused] = concerns(known(drive=empty))
+    [refused] = state_reasons(known(drive=empty))
     assert (refused.state, refused.code) == (State.REFUSED, "DRIVE_NOT_PAYLOAD")
 
 
@@ -110,11 +110,11 @@ def test_a_payload_that_could_not_be_brought_to_life_needs_help() -> None:
 
 
 def test_a_goal_that_cannot_be_had_needs_help() -> None:
-    missing = Problem("NO_PLAN", "nobody can see\nand more")
+    missing = Problem("NO_PLAN", "nothing can see\nand more")
     goal = GivenGoal("3", "follow me", "(x)", "maintain", 0, 3, GoalState.SUSPENDED, "", (missing,))
-    [help] = concerns(Known(Snapshot("spot", 1), goals=(goal,)))
+    [help] = state_reasons(Known(Snapshot("spot", 1), goals=(goal,)))
     assert (help.state, help.code) == (State.HELP, "NO_PLAN")
-    assert help.sentence == "goal 3 cannot be had now, follow me: nobody can see"
+    assert help.sentence == "goal 3 cannot be had now, follow me: nothing can see"
 
 
 def test_a_drive_that_may_be_pulled_tells_what_ends_then() -> None:
@@ -126,21 +126,21 @@ def test_a_drive_that_may_be_pulled_tells_what_ends_then() -> None:
 
 def told(eye: ComponentRecord, payload: PayloadRecord) -> str:
     here = known(payload)
-    [safe] = concerns(replace(here, snapshot=replace(here.snapshot, components=(eye,))))
+    [safe] = state_reasons(replace(here, snapshot=replace(here.snapshot, components=(eye,))))
     return safe.sentence
 
 
 def test_a_component_that_waits_for_its_device_needs_help() -> None:
     waiting = component("eye", "k", need="0403")
-    [help] = concerns(Known(Snapshot("spot", 1, components=(waiting,))))
+    [help] = state_reasons(Known(Snapshot("spot", 1, components=(waiting,))))
     assert (help.state, help.code) == (State.HELP, "DEVICE_MISSING")
     assert help.sentence == "eye waits for its device port"
     served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
-    assert not concerns(Known(Snapshot("spot", 1, components=(served,))))
+    assert not state_reasons(Known(Snapshot("spot", 1, components=(served,))))
 
 
 def test_safe_mode_needs_help() -> None:
-    [help] = concerns(Known(Snapshot("spot", 1, safety=Safety.INITIAL)))
+    [help] = state_reasons(Known(Snapshot("spot", 1, safety=Safety.INITIAL)))
     assert (help.state, help.code) == (State.HELP, "SAFE_MODE")
 
 

@@ -1,4 +1,4 @@
-"""A task whose conditions may still be negative: what an explored domain becomes first."""
+"""The literal task: an explored domain whose conditions may still be negative literals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GOAL = "goal"
 
 
 @dataclass(frozen=True, slots=True)
-class DraftChange:
+class LiteralChange:
     """What changes where a condition holds."""
 
     condition: Literals
@@ -31,19 +31,19 @@ class DraftChange:
 
 
 @dataclass(frozen=True, slots=True)
-class DraftAction:
+class LiteralAction:
     """A ground action; a disjunctive precondition makes several of one name."""
 
     name: str
     condition: Literals
     add: frozenset[int]
     delete: frozenset[int]
-    changes: tuple[DraftChange, ...]
+    changes: tuple[LiteralChange, ...]
     cost: int
 
 
 @dataclass(frozen=True, slots=True)
-class DraftRule:
+class LiteralRule:
     """A derived fact and one way in which it holds."""
 
     head: int
@@ -52,28 +52,28 @@ class DraftRule:
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class LiteralTask:
     """A task in numbers of facts."""
 
-    actions: tuple[DraftAction, ...]
-    rules: tuple[DraftRule, ...]
+    actions: tuple[LiteralAction, ...]
+    rules: tuple[LiteralRule, ...]
     layers: int
     """How many layers of rules there are."""
     goal: Literals
     believed: frozenset[int]
 
 
-def drafted(
+def expanded(
     merged: Merged, found: Exploration, goal: GoalExpr, *, limit: int = INSTANCES_LIMIT
-) -> Draft:
+) -> LiteralTask:
     """Write out the quantifiers and disjunctions of everything that can be reached.
 
     Raises `TooManyBindings` where they speak of too much for a domain with `limit` bound actions.
     """
-    return _Drafting(merged, found, limit).draft(goal)
+    return _Expansion(merged, found, limit).literal_task(goal)
 
 
-class _Drafting:
+class _Expansion:
     def __init__(self, merged: Merged, found: Exploration, limit: int) -> None:
         self._merged = merged
         self._found = found
@@ -81,16 +81,18 @@ class _Drafting:
         self._expander = Expander(found, merged.is_closed, self._spending.work)
         self._groups = strata_of(merged.domain.derived).groups
 
-    def draft(self, goal: GoalExpr) -> Draft:
+    def literal_task(self, goal: GoalExpr) -> LiteralTask:
         rules = list(self._rules())
-        rules += self._stood_for(len(self._groups))
-        actions = [draft for instance in self._found.instances for draft in self._actions(instance)]
+        rules += self._rules_of_disjunctions(len(self._groups))
+        actions = [
+            action for instance in self._found.instances for action in self._actions(instance)
+        ]
         wanted = self._goal(goal)
-        rules += self._stood_for(len(self._groups))
-        draft = Draft(
+        rules += self._rules_of_disjunctions(len(self._groups))
+        literal_task = LiteralTask(
             tuple(actions), tuple(rules), len(self._groups) + 1, wanted, self._found.believed
         )
-        return reachable(draft) if self._was_expanded(goal) else draft
+        return reachable(literal_task) if self._was_expanded(goal) else literal_task
 
     def _was_expanded(self, goal: GoalExpr) -> bool:
         """Whether exploring could not see all conditions."""
@@ -100,7 +102,7 @@ class _Drafting:
             conditions += (action.precondition, *(c.condition for c in action.effect.conditional))
         return any(condition.further for condition in conditions)
 
-    def _rules(self) -> Iterator[DraftRule]:
+    def _rules(self) -> Iterator[LiteralRule]:
         layer = {name: index for index, group in enumerate(self._groups) for name in group}
         for derivation in sorted(
             self._found.derivations, key=lambda d: (d.head, *d.names.values())
@@ -111,17 +113,17 @@ class _Drafting:
             with self._spending.by(rule.head.predicate, rule.origins):
                 bodies = self._expander.alternatives(literals, further, names)
             number = layer[rule.head.predicate]
-            yield from (DraftRule(derivation.head, body, number) for body in bodies)
-            yield from self._stood_for(number)
+            yield from (LiteralRule(derivation.head, body, number) for body in bodies)
+            yield from self._rules_of_disjunctions(number)
 
-    def _stood_for(self, layer: int) -> Iterator[DraftRule]:
+    def _rules_of_disjunctions(self, layer: int) -> Iterator[LiteralRule]:
         """The rules of the facts that were made since last time."""
-        made: list[Disjunction] = list(self._expander.standing)
-        self._expander.standing.clear()
-        for standing in made:
-            yield from (DraftRule(standing.fact, body, layer) for body in standing.bodies)
+        made: list[Disjunction] = list(self._expander.disjunctions)
+        self._expander.disjunctions.clear()
+        for disjunction in made:
+            yield from (LiteralRule(disjunction.fact, body, layer) for body in disjunction.bodies)
 
-    def _actions(self, instance: Instance) -> Iterator[DraftAction]:
+    def _actions(self, instance: Instance) -> Iterator[LiteralAction]:
         cost = self._cost(instance)
         if cost is None:
             return
@@ -134,16 +136,16 @@ class _Drafting:
         add = instance.add.union(*(change.add for change in always))
         delete = instance.delete.union(*(change.delete for change in always)) - add
         for condition in conditions:
-            yield DraftAction(
+            yield LiteralAction(
                 instance.name, condition, add, delete, tuple(_net(changes, add, delete)), cost
             )
 
-    def _changes(self, changes: Iterable[Change]) -> Iterator[DraftChange]:
+    def _changes(self, changes: Iterable[Change]) -> Iterator[LiteralChange]:
         for change in changes:
             literals = Literals(change.positive, change.negative)
             further = change.condition.further
             for condition in self._expander.alternatives(literals, further, change.names):
-                yield DraftChange(condition, change.add, change.delete)
+                yield LiteralChange(condition, change.add, change.delete)
 
     def _cost(self, instance: Instance) -> int | None:
         """None where a function that it adds has no value: then it cannot be taken (PDDL 2.1)."""
@@ -167,7 +169,7 @@ class _Drafting:
             return literals
         with self._spending.by("the goal"):
             ways = self._expander.alternatives(Literals(), goal.further, {})
-        return literals | self._expander.standing_for(ways, GOAL)
+        return literals | self._expander.disjunction(ways, GOAL)
 
     def _number(self, atom: Atom) -> int:
         return self._found.table.number(atom.predicate, tuple(term.name for term in atom.terms))
@@ -187,8 +189,8 @@ def stands_for_goal(text: str) -> bool:
 
 
 def _sorted_out(
-    changes: Iterable[DraftChange],
-) -> tuple[Sequence[DraftChange], Sequence[DraftChange]]:
+    changes: Iterable[LiteralChange],
+) -> tuple[Sequence[LiteralChange], Sequence[LiteralChange]]:
     """Those that happen always, and those that happen where a condition holds."""
     found = list(dict.fromkeys(changes))
     always = [change for change in found if change.condition == Literals()]
@@ -196,8 +198,8 @@ def _sorted_out(
 
 
 def _net(
-    changes: Iterable[DraftChange], add: frozenset[int], delete: frozenset[int]
-) -> Iterator[DraftChange]:
+    changes: Iterable[LiteralChange], add: frozenset[int], delete: frozenset[int]
+) -> Iterator[LiteralChange]:
     """What the conditional changes do beside the unconditional ones."""
     merged: dict[Literals, tuple[frozenset[int], frozenset[int]]] = {}
     for change in changes:
@@ -207,4 +209,4 @@ def _net(
         mine = added - add
         others = deleted - added - add - delete
         if mine or others:
-            yield DraftChange(condition, mine, others)
+            yield LiteralChange(condition, mine, others)

@@ -1,0 +1,1 @@
+"""A charger: it tells when the battery is low, and docks."""
