@@ -14,9 +14,23 @@ from tests.kit.clock import VirtualClock
 
 from nondum.host.core import effects, events
 from nondum.host.core.events import Event, RetryAsked
-from nondum.host.core.records import ComponentState, DeviceClaim, Snapshot, Step
+from nondum.host.core.records import (
+    ComponentState,
+    DeviceClaim,
+    DriveRecord,
+    DriveState,
+    Snapshot,
+    Step,
+)
 from nondum.host.core.state import HostState
-from nondum.host.lifecycle.retry_causes import FIRST_S, LONGEST_S, Amounts
+from nondum.host.lifecycle.retry_causes import (
+    FIRST_S,
+    LONGEST_S,
+    MOST_READINGS,
+    Amounts,
+    Unread,
+    drives_due,
+)
 from nondum.host.manager.refusal_retry import LOOK_S, RefusalRetry
 from nondum.host.people.announcements import announced
 from nondum.host.sources.devices.hardware import devices
@@ -176,3 +190,46 @@ def test_component_that_failed_is_started_again_with_the_device_that_comes_back(
     state, done = after(events.DeviceAppeared(line.id, line), state=state)
     assert state.components["eye"].state is ComponentState.RESTARTING
     assert effects.RestartWorker("eye") in done
+
+
+def silent(code: str = "HELPER_SILENT", state: DriveState = DriveState.IDLE) -> DriveRecord:
+    return replace(
+        after(drive("d"))[0].drives["d"], state=state, problems=(Problem(code, "made up"),)
+    )
+
+
+@pytest.mark.parametrize("code", ["HELPER_SILENT", "HELPER_BUSY"])
+def test_drive_that_the_helper_did_not_get_to_is_read_again_later_and_later(code: str) -> None:
+    unread: dict[str, Unread] = {}
+    at_s, wait_s = 0.0, FIRST_S
+    for _ in range(MOST_READINGS):
+        unread, again = drives_due(unread, [silent(code)], at_s)
+        assert again == ()
+        unread, again = drives_due(unread, [silent(code)], at_s + wait_s)
+        assert again == ("d",)
+        at_s, wait_s = at_s + wait_s, wait_s * 2
+    assert drives_due(unread, [silent(code)], at_s + LONGEST_S)[1] == ()
+
+
+def test_readings_are_counted_while_the_drive_is_read() -> None:
+    before = {"d": Unread(5.0, 3)}
+    assert drives_due(before, [silent(state=DriveState.READING)], 9.0) == (before, ())
+
+
+@pytest.mark.parametrize("drives", [[], [replace(silent(), problems=())], [silent("IO_ERROR")]])
+def test_drive_that_could_be_read_or_is_gone_begins_from_the_start(
+    drives: list[DriveRecord],
+) -> None:
+    assert drives_due({"d": Unread(5.0, 3)}, drives, 9.0) == ({}, ())
+
+
+def test_unread_drive_is_read_when_it_is_due() -> None:
+    state = replace(after(drive("d"))[0], drives={"d": silent()})
+    state, done = after(events.DriveRetried("d", "the helper may answer now"), state=state)
+    assert state.drives["d"].state is DriveState.READING
+    assert any(isinstance(effect, effects.ReadDrive) for effect in done)
+
+
+def test_drive_that_is_being_read_is_not_read_twice() -> None:
+    state = replace(after(drive("d"))[0], drives={"d": silent(state=DriveState.READING)})
+    assert after(events.DriveRetried("d", "the helper may answer now"), state=state)[1] == []

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from nondum.host.core.records import PayloadRecord, Snapshot, Step
+from nondum.host.core.records import DriveRecord, DriveState, PayloadRecord, Snapshot, Step
 from nondum.sdk.errors import Problem
 
 FIRST_S = 5.0
@@ -65,6 +65,12 @@ HELPED_BY_RETRY = frozenset(
 """Codes whose cause is on this host as well, but cannot be seen to go away: a person asks."""
 
 
+HELPER_UNAVAILABLE = frozenset({"HELPER_BUSY", "HELPER_SILENT"})
+"""Codes of drives that the root helper did not get to; it may be about to start."""
+MOST_READINGS = 5
+"""How often such a drive is read again by itself."""
+
+
 @dataclass(frozen=True, slots=True)
 class Amounts:
     """What this host has now, as far as payloads were refused for it."""
@@ -99,6 +105,16 @@ class Waiting:
     not_before_s: float
     """By the steady clock."""
     tries: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """A drive that the helper did not get to."""
+
+    not_before_s: float
+    """When it is read again, by the steady clock."""
+    readings: int = 0
+    """How often it was read again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +195,37 @@ def due(
             )
         kept[payload.key] = one
     return kept, tuple(tried)
+
+
+def drives_due(
+    unread: Mapping[str, Unread], drives: Iterable[DriveRecord], now_s: float
+) -> tuple[dict[str, Unread], tuple[str, ...]]:
+    """The drives that the helper did not get to, and those of them to read again now.
+
+    Each is read again `MOST_READINGS` times at most, each time after twice as long; a drive that
+    could be read, or is pulled, begins from the start.
+    """
+    kept: dict[str, Unread] = {}
+    again: list[str] = []
+    for drive in drives:
+        one = unread.get(drive.id)
+        if drive.state is DriveState.IDLE and is_unread(drive.problems):
+            one = one or Unread(now_s + FIRST_S)
+            if now_s >= one.not_before_s and one.readings < MOST_READINGS:
+                again.append(drive.id)
+                wait_s = min(LONGEST_S, FIRST_S * 2 ** (one.readings + 1))
+                one = Unread(now_s + wait_s, one.readings + 1)
+        elif drive.state is not DriveState.READING:
+            continue
+        if one is not None:
+            kept[drive.id] = one
+    return kept, tuple(again)
+
+
+def is_unread(problems: Iterable[Problem]) -> bool:
+    """Whether the helper is all that kept a drive from being read."""
+    codes = {problem.code for problem in problems}
+    return bool(codes) and codes <= HELPER_UNAVAILABLE
 
 
 def foretold(problems: Iterable[Problem], payload_id: str) -> tuple[Problem, ...]:

@@ -6,9 +6,10 @@ Not all that daemons seem to die of is to blame: power that fails for a moment c
 from __future__ import annotations
 
 from nondum.host.core.events import DriveRetried, RetryAsked, TrialDue
-from nondum.host.core.records import Safety
+from nondum.host.core.records import DriveState, Safety
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution, drive_rules
+from nondum.host.lifecycle.retry_causes import is_unread
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem
 
@@ -28,9 +29,11 @@ def on_trial_due(turn: Turn, event: TrialDue) -> None:
 
 
 def on_drive_retried(turn: Turn, event: DriveRetried) -> None:
-    """Look at a drive that was left alone."""
+    """Look at a drive that was left alone, or that the helper did not get to."""
     drive = turn.state.drives.get(event.drive)
-    if drive is not None and is_quarantined(drive.problems):
+    if drive is None or drive.state is not DriveState.IDLE:
+        return
+    if is_quarantined(drive.problems) or is_unread(drive.problems):
         turn.events.append(event)
         drive_rules.read(turn, drive)
 
