@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from graphlib import CycleError
 from pathlib import Path
 
@@ -72,6 +73,14 @@ def test_planning_has_no_clock_and_no_io() -> None:
     for path in modules("nondum.planning"):
         impure = {name.split(".")[0] for name in imported_names(path)} & IMPURE
         assert not impure, f"{path} imports {impure}"
+
+
+def test_one_place_starts_behaviours() -> None:
+    """What a leaf did not start, nothing halts when the leaf is stopped."""
+    calls = re.compile(r"\brunner\.start\(")
+    paths = [*modules("nondum.planning"), *modules("nondum.host")]
+    found = [path.name for path in paths if calls.search(path.read_text(encoding="utf-8"))]
+    assert found == ["running_leaves.py"]
 
 
 def test_no_portion_claims_the_namespace() -> None:
