@@ -39,6 +39,8 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import HostUnreachable, Problem
 
 HOST = "rover"
+DEADLINE_S = 1e6
+"""Of a search for a plan: its process is real, and the time of many of these tests is not."""
 
 
 def _clock() -> Callable[[], float]:
@@ -119,7 +121,7 @@ class Robot:
             self,
             self.planners,
             emit=self.events.append,
-            deadline_s=10.0,
+            deadline_s=DEADLINE_S,
             patience=self.patience,
             system_tree=self.system_tree,
             now_s=_clock(),
