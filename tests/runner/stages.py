@@ -36,8 +36,8 @@ COMPUTE = (
 )
 """Tests that only compute: they run with what the demonstrations leave of the processors."""
 LOWER = 5
-"""Niceness of what computes beside the demonstrations: a third of their weight. With the lowest it got
-next to nothing on a machine with other work, and tests ended by their time limit."""
+"""Niceness of what computes beside the demonstrations: a third of their weight. With the lowest one
+it got next to nothing on a machine with other work, and tests ended by their time limit."""
 WITH_EXAMPLES = (
     *("host", "planning", "transport", "wheelhouse/nondum", "plugins/sdk/nondum", "demo"),
     "packaging/development/nondum_dev",
