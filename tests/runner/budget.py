@@ -59,8 +59,9 @@ def read(file: Path = FILE) -> Budget:
     return Budget(table["yardstick_s"], table["folders"], table.get("slow_files", {}))
 
 
-def spent(budget: Budget, results: Iterable[Result]) -> tuple[Spent, ...]:
-    """What each folder took, the dearest first."""
+def spent(budget: Budget, results: Iterable[Result], slower: float) -> tuple[Spent, ...]:
+    """What each folder took, the dearest first; `slower` says how many times as long as the machine
+    of the budgets this one takes, and seconds are told as those of that one."""
     seconds: dict[str, float] = defaultdict(float)
     tests: dict[str, int] = defaultdict(int)
     for result in results:
@@ -68,7 +69,7 @@ def spent(budget: Budget, results: Iterable[Result]) -> tuple[Spent, ...]:
         seconds[folder] += result.seconds
         tests[folder] += 1
     rows = [
-        Spent(folder, tests[folder], total, budget.folders.get(folder))
+        Spent(folder, tests[folder], total / slower, budget.folders.get(folder))
         for folder, total in seconds.items()
     ]
     return tuple(sorted(rows, key=lambda row: -row.seconds))

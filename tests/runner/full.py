@@ -41,7 +41,7 @@ def run(tox: Sequence[str]) -> int:
         results,
         died=tuple(one for one in done if one.failed_itself),
         passed_alone=tuple(passed_alone(done, folder)),
-        folders=budget.spent(known, results),
+        folders=budget.spent(known, results, slower),
         is_judged=slower <= yardstick.SLOWER_BY and others <= yardstick.OTHERS,
         refused_skips=hardware.refused(skipped, hardware.read(), os.environ),
     )

@@ -22,7 +22,8 @@ def folders(
     verdict = "judged" if is_judged else "not judged"
     yield (
         f"folders against tests/budget.toml: {verdict} (a fixed piece of work takes {slower:.2f} "
-        f"times as long as there; others use {others:.0%} of the processors)"
+        f"times as long as there, by which the seconds are divided; others use {others:.0%} of the "
+        "processors)"
     )
     width = max((len(row.folder) for row in rows), default=0)
     yield f"{'folder':{width}}  tests  seconds  budget"

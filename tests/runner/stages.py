@@ -3,7 +3,7 @@
 Tests run beside each other, two for each processor, since most wait half of their time; an emulated
 machine and the plugins' own tests run beside them. The demonstrations (marker `alone`) are judged
 in real time, as a person would: no other whole daemon runs meanwhile, and what only computes does
-so at the lowest priority.
+so at a lower priority.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ COMPUTE = (
     "tests/wheelhouse",
 )
 """Tests that only compute: they run with what the demonstrations leave of the processors."""
-LOWEST = 19
+LOWER = 5
+"""Niceness of what computes beside the demonstrations: a third of their weight. With the lowest one
+it got next to nothing on a machine with other work, and tests ended by their time limit."""
 WITH_EXAMPLES = (
     *("host", "planning", "transport", "wheelhouse/nondum", "plugins/sdk/nondum", "demo"),
     "packaging/development/nondum_dev",
@@ -114,7 +116,7 @@ def of_demonstrations(run: Path, options: Sequence[str]) -> tuple[list[Job], ...
     """Lanes: what is judged in real time, and what computes meanwhile."""
     alone = pytest_job("alone", run, (*INSTALLED, "-m", "alone", "tests/demo", *options))
     chosen = (*INSTALLED, *at_once(PROCESSORS), *COMPUTE, *options)
-    return [alone], [pytest_job("compute", run, chosen, niceness=LOWEST)]
+    return [alone], [pytest_job("compute", run, chosen, niceness=LOWER)]
 
 
 def of_plugins(run: Path) -> Iterable[Job]:

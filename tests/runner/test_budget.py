@@ -30,10 +30,15 @@ def test_seconds_of_a_folder_are_those_of_its_tests_and_the_dearest_comes_first(
         passed("tests/host/test_b.py::b", 2.0),
         passed("tests/host/mind/test_c.py::c[1/2]", 3.0),
     ]
-    assert budget.spent(BUDGET, results) == (
+    assert budget.spent(BUDGET, results, slower=1.0) == (
         Spent("tests/host", 2, 5.0, 100.0),
         Spent("tests/sdk", 1, 1.0, 4.0),
     )
+
+
+def test_seconds_of_a_slower_machine_are_told_as_those_of_the_machine_of_the_budgets() -> None:
+    results = [passed("tests/sdk/test_a.py::a", 6.0)]
+    assert budget.spent(BUDGET, results, slower=1.25) == (Spent("tests/sdk", 1, 4.8, 4.0),)
 
 
 @pytest.mark.parametrize(
