@@ -185,6 +185,7 @@ async def _run(
         neighbours.calls if neighbours else workers,
         Planners.installed(memory_mb=config.planning.memory_mb, temporary=folders.planning),
         emit=bus.emit,
+        ask=workers.ask,
         deadline_s=config.planning.deadline_s,
         patience=Patience(
             establish_s=config.planning.establish_s, finish_s=config.planning.finish_s
@@ -236,7 +237,6 @@ async def _run(
     )
     conversation = Conversation(
         mind,
-        workers.plugins,
         workers.pids,
         lambda words: orders.take_words(words),
         answering.answer,

@@ -30,7 +30,7 @@ async def test_question_without_an_answer_is_told_and_makes_no_goal(robot: Robot
     async def answer(words: str) -> str | None:
         raise GoalRefused(Problem("METHOD_UNKNOWN", f"made up for {words}"))
 
-    hearing = Conversation(robot.mind, dict, dict, take, answer)
+    hearing = Conversation(robot.mind, dict, take, answer)
     await hearing.on_words(LISTENER, "mule, what can you do")
     assert any("METHOD_UNKNOWN" in sentence for sentence in told(robot))
 
@@ -40,7 +40,7 @@ async def test_answer_is_not_told_twice(robot: Robot) -> None:
         return "I can blink."
 
     before = told(robot)
-    await Conversation(robot.mind, dict, dict, take, answer).on_words(LISTENER, "what can you do")
+    await Conversation(robot.mind, dict, take, answer).on_words(LISTENER, "what can you do")
     assert told(robot) == before
 
 

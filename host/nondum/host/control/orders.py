@@ -340,7 +340,7 @@ class Orders:
         return await translation.translated(
             words,
             refused,
-            lambda vocabulary: self.workers.translations(words, vocabulary),
+            lambda vocabulary: self.mind.plugins.translations(words, vocabulary),
             composition,
             deadline_s=self.translate_s,
         )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from nondum.host.core.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.host.mind.component_plugins import ComponentPlugins
 from nondum.planning.merge.contribution import Contribution, object_name
 from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.merge import merge
@@ -52,19 +53,17 @@ class Composition:
         return {component: frozenset(facts) for component, facts in found.items() if component}
 
 
-def contributions_of(snapshot: Snapshot) -> tuple[Contribution, ...]:
-    """What each component brings to planning."""
-    return tuple(
-        Contribution.from_description(
-            component.description, host=host, component=component.id, rank=component.rank
-        )
-        for host, component in snapshot.everyone()
-    )
+def compose(
+    snapshot: Snapshot, contributions: tuple[Contribution, ...] | None = None
+) -> Composition:
+    """Merge a snapshot. Takes some ten milliseconds for a dozen components.
 
-
-def compose(snapshot: Snapshot) -> Composition:
-    """Merge a snapshot. Takes some ten milliseconds for a dozen components."""
-    contributions = contributions_of(snapshot)
+    `contributions` are what its components' hooks say, if they were asked already.
+    """
+    if contributions is None:
+        plugins = ComponentPlugins()
+        plugins.see(snapshot)
+        contributions = plugins.contributions()
     merged = merge(contributions, snapshot.host)
     return Composition(
         snapshot,

@@ -21,6 +21,7 @@ from nondum.host.core.records import GoalRecord, Snapshot
 from nondum.host.mind.announcements import People, kept_out, recomposed
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.component_leaf import ComponentLeaf
+from nondum.host.mind.component_plugins import Ask, ComponentPlugins, no_answer
 from nondum.host.mind.component_step import component_step
 from nondum.host.mind.composition import Composition, compose
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
@@ -35,6 +36,7 @@ from nondum.host.mind.views import Views
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.step import Step
+from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.goal import Goal, GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.facts import fact
 from nondum.sdk.errors import GoalRefused, Problem
@@ -59,14 +61,17 @@ class Mind:
         planners: Planners,
         *,
         emit: Emit,
+        ask: Ask = no_answer,
         deadline_s: float = 10.0,
         patience: Patience | None = None,
         system_tree: SystemTree = default_tree,
         now_s: Callable[[], float] = time.monotonic,
         wall_s: Callable[[], float] = time.time,
     ) -> None:
-        """`emit` is told of goals and plans; `deadline_s` bounds a search for a plan, `patience`
+        """`emit` is told of goals and plans; `ask` asks a component's worker for an acting hook;
+        `deadline_s` bounds a search for a plan, `patience`
         what behaviours are waited for."""
+        self.plugins = ComponentPlugins(ask)
         self.beliefs = Beliefs(host, now_s)
         self.queue = GoalQueue()
         self.names: Mapping[str, str] = {}
@@ -117,11 +122,14 @@ class Mind:
         if self._composing is not None:
             self._composing.cancel()
             self._composing = None
-        if sum(1 for _ in snapshot.everyone()) > SMALL:
-            self._composing = asyncio.create_task(asyncio.to_thread(composed, snapshot))
+        self.plugins.see(snapshot)
+        contributions = self.plugins.contributions()
+        if len(contributions) > SMALL:
+            merging = asyncio.to_thread(composed, snapshot, contributions)
+            self._composing = asyncio.create_task(merging)
             self._composing.add_done_callback(lambda _: self.wake())
         else:
-            self._adopt(composed(snapshot))
+            self._adopt(composed(snapshot, contributions))
         self.wake()
 
     def on_event(self, event: Event) -> None:
@@ -385,11 +393,11 @@ def _too_early() -> GoalRefused:
     return GoalRefused(Problem("GOAL_TOO_EARLY", text, fix="ask again in a second"))
 
 
-def composed(snapshot: Snapshot) -> Composition | str:
+def composed(snapshot: Snapshot, contributions: tuple[Contribution, ...]) -> Composition | str:
     """The composition of a snapshot, or the fault that merging ran into: strangers' words must not
     stop the host."""
     try:
-        return compose(snapshot)
+        return compose(snapshot, contributions)
     except Exception as error:
         log.exception("revision %d cannot be merged", snapshot.revision)
         return f"merging failed with {type(error).__name__}: {error}"

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
+from nondum.host.mind.component_plugins import Answer, Said
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
 from nondum.host.people.replaced import replacing
 from nondum.host.people.sayings import sayings
-from nondum.host.workers.proxies import Answer
 from nondum.sdk.errors import GoalRefused
 
 SPEAK_S = 30.0
@@ -26,22 +26,6 @@ LONGEST_SPOKEN = 160
 """A longer sentence is for reading."""
 PAUSE_S = 0.2
 """Between two sentences of one listener, however much it says."""
-
-
-class Speaking(Protocol):
-    """A running plugin, as far as it speaks and listens."""
-
-    def speak(self, text: str) -> Answer:
-        """Have it say something."""
-        ...
-
-    def listen(self) -> Answer:
-        """Have it wait for a person's words."""
-        ...
-
-    def learn_words(self, vocabulary: Mapping[str, Any]) -> Answer:
-        """Have it learn what can be said now."""
-        ...
 
 
 Take: TypeAlias = Callable[[str], Awaitable[str]]
@@ -57,18 +41,16 @@ class Conversation:
     def __init__(
         self,
         mind: Mind,
-        plugins: Callable[[], Mapping[str, Speaking]],
         processes: Callable[[], Mapping[str, int]],
         take: Take,
         answer: Reply,
     ) -> None:
-        """`plugins` are those that run now, by component, `processes` their ids: one that does not
-        listen is asked again when its component has a new process. `take` makes goals of words,
+        """`processes` are those of running workers, by component: one that does not listen is asked
+        again when its component has a new process. `take` makes goals of words,
         here or elsewhere, `answer` says what there is to say to a question."""
         self._mind = mind
         self._answer = answer
         self._take = take
-        self._plugins = plugins
         self._processes = processes
         self._saying = asyncio.Lock()
 
@@ -81,8 +63,8 @@ class Conversation:
     async def say(self, text: str) -> None:
         """Have a sentence said by all components that speak, at once; `SPEAK_S` at most."""
         async with self._saying:
-            said = (p.speak(text) for p in self._plugins().values())
-            saying = [asyncio.ensure_future(_awaited(answer)) for answer in said]
+            said: list[Said[Answer]] = self._mind.plugins.hook.speak(ctx=None, text=text)
+            saying = [asyncio.ensure_future(_awaited(one.value)) for one in said]
             if saying:
                 _, late = await asyncio.wait(saying, timeout=SPEAK_S)
                 for task in late:
@@ -113,7 +95,8 @@ class Conversation:
         version, listening = -1, dict[tuple[str, int], asyncio.Task[None]]()
         try:
             while True:
-                present = {key for key in self._processes().items() if key[0] in self._plugins()}
+                running = self._processes().items()
+                present = {key for key in running if self._mind.plugins.plugin(key[0])}
                 for gone in listening.keys() - present:
                     listening.pop(gone).cancel()
                 for key in present - listening.keys():
@@ -136,19 +119,19 @@ class Conversation:
     async def _teach(self, component: str) -> None:
         """Tell a component what can be said, each time that it is something else."""
         version, seen, taught = -1, None, None
-        while plugin := self._plugins().get(component):
+        while plugin := self._mind.plugins.plugin(component):
             composition = self._mind.composition
             if composition is not None and composition is not seen:
                 seen, vocabulary = composition, sayings(composition.book, _hosts(composition))
                 if vocabulary != taught:
-                    await plugin.learn_words(vocabulary)
+                    await plugin.learn_words(vocabulary).value
                     taught = vocabulary
             version = await self._mind.changed(version)
 
     async def _hear(self, component: str) -> None:
         """Hear what a component hears, until it says nothing: then it does not listen."""
-        while plugin := self._plugins().get(component):
-            words = (await plugin.listen() or {}).get("words")
+        while plugin := self._mind.plugins.plugin(component):
+            words = (await plugin.listen().value or {}).get("words")
             if not isinstance(words, str) or not words.strip():
                 return
             await self.on_words(component, words)

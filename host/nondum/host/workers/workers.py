@@ -9,8 +9,6 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
-import pluggy
-
 from nondum.host.core.events import (
     Emit,
     Event,
@@ -28,7 +26,6 @@ from nondum.host.workers.in_flight import Search
 from nondum.host.workers.launcher import Launcher, WorkerLauncher
 from nondum.host.workers.logs import LogLine, Logs
 from nondum.host.workers.optional_inputs import Choice
-from nondum.host.workers.proxies import Answer, Proxy, plugin_manager
 from nondum.host.workers.role import Role
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.streams import Streams
@@ -40,6 +37,7 @@ from nondum.planning.merge.core import core_value_types
 from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.transport import WorkerLink
 
 FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 """Predicate, objects, and the value as it travels; None: it has none (any more)."""
@@ -73,7 +71,8 @@ class Workers:
         self.search = Search(self.streams.senders, self.streams.ends)
         self.logs = Logs()
         self._host, self._emit = host, emit
-        self._manager = plugin_manager()
+        self._links: dict[str, WorkerLink] = {}
+        """Of the workers that may be asked for things, by component."""
         self._supervisors: dict[str, Supervisor] = {}
         self._extra_workers = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
@@ -84,11 +83,6 @@ class Workers:
         self._keeps_spare = False
         self._warm_at: asyncio.TimerHandle | None = None
         self._warming: asyncio.Task[None] | None = None
-
-    @property
-    def hook(self) -> pluggy.HookRelay:
-        """The hooks of all running plugins; acting ones give awaitables. Pass `ctx=None`."""
-        return self._manager.hook
 
     async def start(self, spec: WorkerSpec, role: Role = Role.ACTIVE) -> PluginDescription:
         """Start a component's worker and keep one alive until `stop`.
@@ -290,15 +284,20 @@ class Workers:
             return ()
         return tuple(supervisor.worker.dead_conditions.values())
 
-    def plugins(self) -> dict[str, Proxy]:
-        """The plugins that run now, by component."""
-        named = self._manager.list_name_plugin()
-        return {name: plugin for name, plugin in named if isinstance(plugin, Proxy)}
-
-    def translations(self, words: str, vocabulary: Mapping[str, Any]) -> dict[str, Answer]:
-        """Ask every running component to translate what a person said: component → its answer."""
-        plugins = sorted(self.plugins().items())
-        return {name: plugin.translate_goal(words, vocabulary) for name, plugin in plugins}
+    async def ask(
+        self, component: str, hook: str, body: Mapping[str, Any]
+    ) -> Mapping[str, Any] | None:
+        """What a component's plugin answers to an acting hook; None if it does not answer."""
+        link = self._links.get(component)
+        if link is None:
+            return None
+        try:
+            return await link.request(hook, body)
+        except errors.LinkClosed:  # it has ended or was taken away, which its own events tell
+            return None
+        except errors.NondumError as error:
+            log.warning("%s does not answer %s: %s", component, hook, error)
+            return None
 
     async def keep_spare(self) -> None:
         """Prepare the next launch, now and, from now on, some time after every launch."""
@@ -354,14 +353,12 @@ class Workers:
         for claim in worker.claims:
             if isinstance(claim, StreamFlowing):
                 self.streams.set_flowing(claim.stream, is_flowing=True)
-        proxy = Proxy(spec.component, spec.index, worker.link.request)
-        self._manager.register(proxy, spec.component)
+        self._links[spec.component] = worker.link
 
     def on_gone(self, worker: Worker) -> None:
         """A worker is going or gone."""
         component = worker.spec.component
-        if self._manager.has_plugin(component):
-            self._manager.unregister(name=component)
+        self._links.pop(component, None)
         self.streams.leave(component)
 
     def _on_ambiguous(self, choice: Choice) -> None:

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from nondum.planning.pddl.facts import fact
-from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
+from nondum.sdk.description import (
+    Behaviour,
+    Fragment,
+    Label,
+    Phrase,
+    PluginDescription,
+    Unit,
+)
 
 
 def object_name(host: str, component: str, local: str) -> str:
@@ -77,9 +84,36 @@ class Contribution:
         cls, description: PluginDescription, *, host: str, component: str, rank: int = 0
     ) -> Contribution:
         """What a plugin brings when `component` on `host` runs it."""
-        units = tuple(
+        return cls.of(
+            host=host,
+            component=component,
+            rank=rank,
+            describe={"name": description.name, "version": description.version},
+            fragments=description.fragments,
+            units=description.units,
+            behaviours=description.behaviours,
+            phrases=description.phrases,
+            labels=description.labels,
+        )
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        host: str,
+        component: str,
+        rank: int,
+        describe: Mapping[str, str],
+        fragments: tuple[Fragment, ...],
+        units: tuple[Unit, ...],
+        behaviours: tuple[Behaviour, ...],
+        phrases: tuple[Phrase, ...],
+        labels: tuple[Label, ...],
+    ) -> Contribution:
+        """The same from what the describing hooks say (`docs/hooks.md`)."""
+        unit_objects = tuple(
             UnitObject(unit.name, object_name(host, component, unit.name), unit.type)
-            for unit in description.units
+            for unit in units
         )
         streams = tuple(
             StreamObject(
@@ -88,21 +122,21 @@ class Contribution:
                 type=output.type,
                 unit=object_name(host, component, unit.name),
             )
-            for unit in description.units
+            for unit in units
             for output in unit.outputs
         )
         return cls(
             component=component,
             host=host,
-            plugin=description.name,
-            version=description.version,
+            plugin=describe["name"],
+            version=describe["version"],
             rank=rank,
-            fragments=description.fragments,
-            units=units,
+            fragments=fragments,
+            units=unit_objects,
             streams=streams,
-            behaviours=description.behaviours,
-            phrases=description.phrases,
-            labels=description.labels,
+            behaviours=behaviours,
+            phrases=phrases,
+            labels=labels,
         )
 
     def local_names(self) -> dict[str, str]:
