@@ -21,8 +21,9 @@ from pathlib import Path
 from benchmarks.hard_goals.problems import FAMILIES, Texts
 from benchmarks.measuring import machine, table
 
+from nondum.host.mind.extension import GROUP
 from nondum.host.mind.planner_process import PlannerProcess
-from nondum.host.mind.planners import GROUP, Planners
+from nondum.host.mind.planners import Planners
 from nondum.planning.ground.bounds import INSTANCES_LIMIT
 from nondum.planning.ground.ground import ground
 from nondum.planning.workbench import standalone

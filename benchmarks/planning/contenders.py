@@ -61,8 +61,9 @@ def portfolio(domain: Path, problem: Path, clock: Clock) -> Answer:
     """The planners that nondum comes with, side by side in processes, as hosts run them."""
     from importlib_metadata import entry_points
 
+    from nondum.host.mind.extension import GROUP
     from nondum.host.mind.planner_process import PlannerProcess
-    from nondum.host.mind.planners import GROUP, Planners
+    from nondum.host.mind.planners import Planners
 
     found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
     shipped = [name for name in ("native", "pyperplan") if name in found]

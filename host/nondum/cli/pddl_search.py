@@ -146,8 +146,9 @@ class Question:
 def _planners(limits: Limits) -> Planners:
     from importlib_metadata import entry_points
 
+    from nondum.host.mind.extension import GROUP
     from nondum.host.mind.planner_process import PlannerProcess
-    from nondum.host.mind.planners import GROUP, Planners
+    from nondum.host.mind.planners import Planners
 
     found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
     if limits.planner is not None and limits.planner not in found:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nondum.host import verbs
@@ -33,6 +34,8 @@ from nondum.host.core.events import (
 )
 from nondum.host.core.keyed_queues import in_thread
 from nondum.host.core.records import Safety
+from nondum.host.extension.hookspecs import Host
+from nondum.host.extension.loading import Extensions
 from nondum.host.jobs.children import watched_without_threads
 from nondum.host.lifecycle import crash_attribution, safe_mode
 from nondum.host.lifecycle.advance import RULES
@@ -60,8 +63,7 @@ from nondum.host.people.stop_button.hook import StopHook
 from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.helper import privileged
-from nondum.host.service import journal, malloc
-from nondum.host.service.journal_messages import JournalMessages
+from nondum.host.service import malloc
 from nondum.host.service.notify import Notifier
 from nondum.host.service.service import Part, Service
 from nondum.host.service.stop_signals import told_to_stop
@@ -169,6 +171,7 @@ async def _run(
         manager.add_source(source)
     stop_hook = StopHook(config.stop)
     stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
+    extensions = Extensions()
     neighbours = await _neighbours(
         config,
         folders,
@@ -183,7 +186,7 @@ async def _run(
     mind = Mind(
         config.host.name,
         neighbours.calls if neighbours else workers,
-        Planners.installed(memory_mb=config.planning.memory_mb, temporary=folders.planning),
+        _planners(config, extensions, folders.planning),
         emit=bus.emit,
         ask=workers.ask,
         deadline_s=config.planning.deadline_s,
@@ -201,8 +204,6 @@ async def _run(
     bus.subscribe(software.on_event)
     bus.subscribe(service.on_event)
     bus.subscribe(counter.on_event)
-    if journal.is_in_use():
-        bus.subscribe(JournalMessages(catalogue.snapshot).on_event)
     listing = executor.installation.listing
     clock = ClockWatch(lambda: executor.trust.trust, bus.emit)
 
@@ -219,6 +220,7 @@ async def _run(
             *stop_hook.warnings,
             *stop_button.warnings,
             *map(str, cgroups.problems()),
+            *map(str, extensions.problems),
             *map(str, (*slot_problems(drives), *slot_problems(devices))),
             *of_peers,
         )
@@ -241,14 +243,16 @@ async def _run(
         lambda words: orders.take_words(words),
         answering.answer,
     )
+    host = Host(config, folders.root, catalogue.snapshot, conversation.say, mind.people.newest)
+    for listener in extensions.asked("listeners", host=host):
+        bus.subscribe(listener)
     feedback: Feedback = feedback_parts.made(
         config.feedback,
-        folders.root,
         catalogue,
         mind,
         places,
         lambda: goal_files.state_reasons,
-        conversation,
+        extensions.asked("feedback_outputs", host=host),
         news.look_again,
     )
     bus.subscribe(feedback.on_event)
@@ -458,6 +462,22 @@ def _make_slots(config: HostConfig) -> None:
 
 _ENDS = DriveRemoved | PayloadWithdrawn | PayloadActivated | RetryAsked
 """What was told of a drive or payload before these is of no interest any more."""
+
+
+def _planners(config: HostConfig, extensions: Extensions, temporary: Path) -> Planners:
+    """The planners of all extensions, or those that the configuration names.
+
+    Raises `ConfigRefused` (CONFIG_PLANNER).
+    """
+    found: dict[str, str] = dict(extensions.asked("planners"))
+    wanted = config.planning.planners
+    if unknown := [name for name in wanted if name not in found]:
+        known = ", ".join(sorted(found)) or "none"
+        text = f"no planner {unknown[0]!r} is installed"
+        problem = Problem("CONFIG_PLANNER", text, where="planning.planners", have=known)
+        raise ConfigRefused(problem)
+    chosen = {name: found[name] for name in wanted or found}
+    return Planners.of(chosen, memory_mb=config.planning.memory_mb, temporary=temporary)
 
 
 class _Listener:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nondum.cli.examination.finding import Finding, bad, ok, warn
 from nondum.host.config.host_config import HostConfig
-from nondum.host.mind.planners import GROUP
+from nondum.host.mind.extension import GROUP
 from nondum.host.trust import anchors
 from nondum.sdk.errors import NondumError
 

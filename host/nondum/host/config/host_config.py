@@ -149,6 +149,8 @@ class PlanningSection:
     """Time that a search for a plan is given."""
     memory_mb: int = 512
     """Memory of a planner's process."""
+    planners: tuple[str, ...] = ()
+    """Names of the planners that search; with none, all that are installed do."""
     translate_s: float = 10.0
     """Time that components have to translate words which match no phrase."""
     establish_s: float = 30.0

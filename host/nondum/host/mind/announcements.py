@@ -23,6 +23,10 @@ MAX_CHARACTERS = 4096
 _Component: TypeAlias = ComponentRecord | PeerComponent
 
 
+NEWEST = 3
+"""Sentences that are looked at where only the last ones count."""
+
+
 @dataclass(frozen=True, slots=True)
 class Told:
     """One sentence."""
@@ -64,6 +68,10 @@ class People:
     def since(self, number: int) -> tuple[Told, ...]:
         """What was told after the sentence of that number."""
         return tuple(told for told in self._told if told.number > number)
+
+    def newest(self) -> list[str]:
+        """The last `NEWEST` sentences, the newest last."""
+        return [told.text for told in self.since(self._number - NEWEST)]
 
     def tell(self, text: str, about: str = "") -> None:
         """Say a sentence, `about` something that may be gone some time."""

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from importlib_metadata import entry_points
-
+from nondum.host.mind.extension import planners
 from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planner_wire import Request, TaskText
 from nondum.planning.ground.delete_relaxation import quick_answer
@@ -33,7 +32,6 @@ from nondum.sdk.planner import (
     Unsolvable,
 )
 
-GROUP = "nondum.planners"
 SMALL = 1_000
 """Ground actions of a task for which a cheaper plan is waited for, …"""
 CHEAPER_S = 0.3
@@ -61,7 +59,13 @@ class Planners:
     @classmethod
     def installed(cls, *, memory_mb: int, temporary: Path | None = None) -> Planners:
         """Those that are installed in this host's own environment."""
-        found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
+        return cls.of(planners(), memory_mb=memory_mb, temporary=temporary)
+
+    @classmethod
+    def of(
+        cls, found: Mapping[str, str], *, memory_mb: int, temporary: Path | None = None
+    ) -> Planners:
+        """Planners by name: `module:Class`."""
         return cls(
             [
                 PlannerProcess(name, found[name], memory_mb=memory_mb, temporary=temporary)

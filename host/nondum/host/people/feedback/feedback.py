@@ -20,9 +20,10 @@ from nondum.host.core.events import (
 )
 from nondum.host.core.feedback_state import NOTHING, State, StateReason
 from nondum.host.core.records import Snapshot
+from nondum.host.extension.hookspecs import Output
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.people.feedback import showing
-from nondum.host.people.feedback.outputs import Outlet, Output
+from nondum.host.people.feedback.outputs import Outlet
 from nondum.host.people.feedback.showing import Durations, Shown
 from nondum.host.people.feedback.state_reasons import Known, refusal, state_reasons
 from nondum.sdk.errors import Problem

@@ -6,24 +6,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Protocol
 
 from nondum.host.core.feedback_state import StateReason
+from nondum.host.extension.hookspecs import Output
 from nondum.sdk.errors import NondumError
 
 log = logging.getLogger(__name__)
-
-
-class Output(Protocol):
-    """A way to show a state to a person."""
-
-    async def show(self, reason: StateReason) -> None:
-        """Show it. Raises `NondumError` where that cannot be done."""
-        ...
-
-    async def end(self) -> None:
-        """Leave everything as it was before."""
-        ...
 
 
 class Outlet:

@@ -35,6 +35,16 @@ CODES = (
         "`nondum explain` lists all codes",
     ),
     Code(
+        "CONFIG_PLANNER",
+        "A planner that [planning] planners names is not installed.",
+        "install it, or name another one",
+    ),
+    Code(
+        "EXTENSION_BROKEN",
+        "An extension of the host cannot be loaded, or failed when it was asked.",
+        "see the log of the daemon; update or uninstall the extension",
+    ),
+    Code(
         "CONFIG_FOLDER",
         "A folder of the configuration cannot be used.",
         "see `slots` under the section that is named",

@@ -1,0 +1,76 @@
+"""The hooks that an extension of the host may implement (docs/hooks.md).
+
+An extension is a module or object named by an entry point of the group `nondum.host`, in the
+environment of the daemon: it runs in the daemon's process and is trusted, and must not block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import pluggy
+
+from nondum.host.config.host_config import HostConfig
+from nondum.host.core.events import Emit
+from nondum.host.core.feedback_state import StateReason
+from nondum.host.core.records import Snapshot
+
+PROJECT = "nondum.host"
+"""The name of pluggy's project, and of the group of entry points."""
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+class Output(Protocol):
+    """A way to show a state to a person."""
+
+    async def show(self, reason: StateReason) -> None:
+        """Show it. Raises `NondumError` where that cannot be done."""
+        ...
+
+    async def end(self) -> None:
+        """Leave everything as it was before."""
+        ...
+
+
+class Say(Protocol):
+    """Has a sentence said by the components that speak."""
+
+    async def __call__(self, text: str) -> None:
+        """Return once it is said, or after a while."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """What an extension may know and use of the host that it runs in."""
+
+    config: HostConfig
+    folder: Path
+    """The state folder; an extension keeps files in `extensions/<its name>/` below it."""
+    snapshot: Callable[[], Snapshot]
+    """The catalogue as it was last committed."""
+    say: Say
+    told: Callable[[], Sequence[str]]
+    """The newest sentences that people were told, the newest last."""
+
+
+@hookspec
+def planners() -> Mapping[str, str]:  # type: ignore[empty-body]  # specifications have no body
+    """Planners by name: `module:Class`, each runs in a separate process.
+
+    The class has the interface `nondum.sdk.planner.Planner` or `TextPlanner`.
+    """
+
+
+@hookspec
+def feedback_outputs(host: Host) -> Iterable[Output]:  # type: ignore[empty-body]  # a specification
+    """What shows people the host's state: lamps, sounds, displays."""
+
+
+@hookspec
+def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a specification
+    """Functions that are told every event, on the loop, after it was committed."""
