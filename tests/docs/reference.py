@@ -12,6 +12,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
+from types import ModuleType
 from typing import Any, get_type_hints
 
 import click
@@ -23,6 +24,7 @@ from nondum.cli.main import cli
 from nondum.host.config import host_config
 from nondum.host.config import reference as keys_of
 from nondum.host.config.effective import as_toml
+from nondum.host.extension import hookspecs
 from nondum.sdk import hooks
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -91,10 +93,15 @@ def hook_signatures() -> str:
     """A section a hook: its signature and what it is for."""
     return "\n".join(
         [
-            "## Describing hooks\n",
-            *(_hook(name) for name in hooks.DESCRIBING),
-            "## Acting hooks\n",
-            *(_hook(name) for name in hooks.ACTING),
+            "## Hooks for plugins: describing\n",
+            *(_hook(hooks, name) for name in hooks.DESCRIBING),
+            "## Hooks for plugins: acting\n",
+            *(_hook(hooks, name) for name in hooks.ACTING),
+            "## Hooks for extensions of the host\n",
+            *(_hook(hookspecs, name) for name in hookspecs.HOOKS),
+            f"What `host` is: {inspect.getdoc(hookspecs.Host)}\n",
+            *(f"- `host.{name}`: {text}" for name, text in _host_fields()),
+            "",
         ]
     )
 
@@ -141,8 +148,13 @@ def _shown(default: Any) -> str:
             return f"`{as_toml(default)}`"
 
 
-def _hook(name: str) -> str:
-    function = getattr(hooks, name)
+def _host_fields() -> Iterator[tuple[str, str]]:
+    docs = field_docs(hookspecs.Host)
+    return ((field.name, " ".join(docs[field.name].split())) for field in fields(hookspecs.Host))
+
+
+def _hook(module: ModuleType, name: str) -> str:
+    function = getattr(module, name)
     kind = "async def" if inspect.iscoroutinefunction(function) else "def"
     signature = f"{kind} {name}{inspect.signature(function)}".replace("'", "")
     return f"### {name}\n\n    {signature}\n\n{inspect.getdoc(function)}\n"

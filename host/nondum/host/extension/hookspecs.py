@@ -22,6 +22,7 @@ PROJECT = "nondum.host"
 """The name of pluggy's project, and of the group of entry points."""
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
+HOOKS = ("planners", "feedback_outputs", "listeners")
 
 
 class Output(Protocol):
@@ -49,11 +50,13 @@ class Host:
     """What an extension may know and use of the host that it runs in."""
 
     config: HostConfig
+    """The configuration, as it was read."""
     folder: Path
     """The state folder; an extension keeps files in `extensions/<its name>/` below it."""
     snapshot: Callable[[], Snapshot]
     """The catalogue as it was last committed."""
     say: Say
+    """Has a sentence said by the components that speak."""
     told: Callable[[], Sequence[str]]
     """The newest sentences that people were told, the newest last."""
 
