@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import json
 import math
 import random
 import shutil
@@ -54,10 +55,24 @@ def main(arguments: Sequence[str]) -> int:
 def _play(options: argparse.Namespace, work: Path, say: Says) -> Iterator[StageResult]:
     kit = _kit(options, work, say)
     with (
-        running(work, name="panther", initial=kit.of([INITIAL]), trust=kit.trust) as robot,
+        running(
+            work,
+            name="panther",
+            initial=kit.of([INITIAL]),
+            trust=kit.trust,
+            more=_more(options),
+        ) as robot,
         live.view([robot], is_shown=not (options.json or options.plain)),
     ):
         yield from _played(robot, kit, options, say)
+
+
+def _more(options: argparse.Namespace) -> str:
+    """Further lines of the host's configuration."""
+    lines = [] if options.install is None else ["[install]", f'method = "{options.install}"']
+    if options.planner:
+        lines += ["[planning]", f"planners = {json.dumps(options.planner)}"]
+    return "\n".join((*lines, ""))
 
 
 def _played(
@@ -170,6 +185,17 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
         type=int,
         metavar="SEED",
         help="replace every name of plugins, components, units and objects by a random one",
+    )
+    made.add_argument(
+        "--planner",
+        action="append",
+        metavar="NAME",
+        help="plan with this planner only; may be given several times [default: all installed]",
+    )
+    made.add_argument(
+        "--install",
+        choices=("store", "pip"),
+        help="how payloads are installed [default: store]",
     )
     made.add_argument(
         "--wrong-mount",

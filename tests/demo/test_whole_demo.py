@@ -62,6 +62,20 @@ def test_pointing_alone_reaches_its_goal(seed: int) -> None:
     assert_reached(demonstrate("--only", "III", "--seed", str(seed)), ["III"])
 
 
+@pytest.mark.long("demonstrations")
+@pytest.mark.parametrize("options", [("--planner", "pyperplan"), ("--install", "pip")])
+def test_promised_packages_can_carry_the_whole_way(options: tuple[str, ...], seed: int) -> None:
+    """pyperplan as the only planner; pip as what installs."""
+    chosen = ("--only", "I", "--only", "III", *options)
+    assert_reached(demonstrate(*chosen, "--seed", str(seed)), ["I", "III"])
+
+
+def test_planner_that_is_not_installed_is_refused() -> None:
+    done = demonstrate("--only", "III", "--planner", "no-such")
+    assert done.returncode != 0
+    assert "CONFIG_PLANNER" in done.stdout + done.stderr
+
+
 def test_a_wrong_mount_fails_the_demonstration() -> None:
     """The operator tells a mount turned by half a right angle: drivers and host cannot know."""
     done = demonstrate("--only", "III", "--wrong-mount", "45", "--seed", "1")
