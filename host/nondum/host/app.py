@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,9 +54,8 @@ from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
 from nondum.host.people.announcements import announced
 from nondum.host.people.answering import Answering
-from nondum.host.people.conversation import Conversation, Reply, Take, wanted
+from nondum.host.people.conversation import Conversation, Take, wanted
 from nondum.host.people.feedback import parts as feedback_parts
-from nondum.host.people.feedback.feedback import Feedback
 from nondum.host.people.goal_files import GoalFiles, of_people
 from nondum.host.people.stop_button.button import StopButton
 from nondum.host.people.stop_button.hook import StopHook
@@ -129,7 +128,9 @@ async def _run_as(
         keep = config.journal.keep
         catalogue = await Catalogue.open(folders.catalogue, config.host.name, keep=keep)
         try:
-            await _run(service, config, folders, catalogue, counter, safety, more_drives, stop)
+            host = RunningHost(service, config, folders, catalogue)
+            await host.make(counter, safety, more_drives)
+            await host.run(stop)
             await in_thread(counter.clear)
         finally:
             await catalogue.close()
@@ -138,241 +139,268 @@ async def _run_as(
         held.release()
 
 
-async def _run(
-    service: Service,
-    config: HostConfig,
-    folders: Folders,
-    catalogue: Catalogue,
-    counter: CrashCounter,
-    safety: tuple[Safety, str],
-    more_drives: Sequence[DriveSource],
-    stop: asyncio.Event,
-) -> None:
-    bus = Bus(RULES)
-    timing = Timing(startup_s=config.workers.startup_s, settle_beats=config.workers.settle_beats)
-    cgroups = await in_thread(_cgroups, folders)
-    confinement_state = await in_thread(
-        confinement_choice.confinement_state,
-        config.workers.confinement,
-        config.workers.minimum_confinement,
-        folders.confinement,
-        folders.probes,
-    )
-    confinement = confinement_choice.confinement(confinement_state, folders.of_workers)
-    if changes_user(confinement):
-        await in_thread(let_pass, folders)
-    launcher = WorkerLauncher(confinement, cgroups, folders.scratches, timing.startup_s)
-    workers = Workers(config.host.name, bus.emit, launcher=launcher, timing=timing)
-    executor = Executor(config.host.name, folders, workers, bus.emit, _install_options(config))
-    manager = ComponentManager(catalogue, executor, bus)
-    manager.leave_alone(*safety)
-    drives, devices = drive_sources(config, folders), device_sources(config)
-    for source in (*drives, *more_drives):
-        manager.add_source(source)
-    stop_hook = StopHook(config.stop)
-    stopping = Stopping(lambda: mind, workers, stop_hook.run_soon)
-    extensions = Extensions()
-    neighbours = await _neighbours(
-        config,
-        folders,
-        workers,
-        catalogue,
-        bus,
-        lambda: mind,
-        stopping.stop,
-        lambda words: answering.own(words),
-        executor,
-    )
-    mind = Mind(
-        config.host.name,
-        neighbours.calls if neighbours else workers,
-        _planners(config, extensions, folders.planning),
-        emit=bus.emit,
-        ask=workers.ask,
-        deadline_s=config.planning.deadline_s,
-        patience=Patience(
-            establish_s=config.planning.establish_s, finish_s=config.planning.finish_s
-        ),
-        system_tree=load_system_tree(config.host.system_tree),
-    )
-    bus.subscribe(_Listener(catalogue, mind, workers).on_event)
-    if neighbours is not None:
-        bus.subscribe(neighbours.on_event)
-    news = News()
-    bus.subscribe(news.on_event)
-    software = Software(catalogue.snapshot, mind.people.tell)
-    bus.subscribe(software.on_event)
-    bus.subscribe(service.on_event)
-    bus.subscribe(counter.on_event)
-    listing = executor.installation.listing
-    clock = ClockWatch(lambda: executor.trust.trust, bus.emit)
+class RunningHost:
+    """The parts of a host that runs, made from the innermost out; each may use those before it."""
 
-    def warnings() -> tuple[str, ...]:
-        of_peers = neighbours.warnings if neighbours else ()
+    def __init__(
+        self, service: Service, config: HostConfig, folders: Folders, catalogue: Catalogue
+    ) -> None:
+        self.service, self.config, self.folders = service, config, folders
+        self.catalogue = catalogue
+        self.bus = Bus(RULES)
+        self.extensions = Extensions()
+
+    async def make(
+        self,
+        counter: CrashCounter,
+        safety: tuple[Safety, str],
+        more_drives: Sequence[DriveSource],
+    ) -> None:
+        """Make everything. Raises `ConfigRefused`, `PeerRefused`."""
+        self.counter, self.why_safe = counter, safety[1]
+        await self._make_workers()
+        self._make_manager(safety, more_drives)
+        self.stop_hook = StopHook(self.config.stop)
+        self.stopping = Stopping(lambda: self.mind, self.workers, self.stop_hook.run_soon)
+        self.peers = await self._peers()
+        self._make_mind()
+        self._make_followers()
+        self._make_conversation()
+        self._make_feedback()
+        self._make_orders()
+        self._make_control()
+
+    async def _make_workers(self) -> None:
+        config, folders = self.config, self.folders
+        sections = config.workers
+        timing = Timing(startup_s=sections.startup_s, settle_beats=sections.settle_beats)
+        self.cgroups = await in_thread(_cgroups, folders)
+        self.confinement_state = await in_thread(
+            confinement_choice.confinement_state,
+            sections.confinement,
+            sections.minimum_confinement,
+            folders.confinement,
+            folders.probes,
+        )
+        confinement = confinement_choice.confinement(self.confinement_state, folders.of_workers)
+        if changes_user(confinement):
+            await in_thread(let_pass, folders)
+        launcher = WorkerLauncher(confinement, self.cgroups, folders.scratches, timing.startup_s)
+        self.workers = Workers(config.host.name, self.bus.emit, launcher=launcher, timing=timing)
+
+    def _make_manager(self, safety: tuple[Safety, str], more_drives: Sequence[DriveSource]) -> None:
+        config, bus = self.config, self.bus
+        options = _install_options(config)
+        self.executor = Executor(config.host.name, self.folders, self.workers, bus.emit, options)
+        self.manager = ComponentManager(self.catalogue, self.executor, bus)
+        self.manager.leave_alone(*safety)
+        self.drives, self.devices = drive_sources(config, self.folders), device_sources(config)
+        for source in (*self.drives, *more_drives):
+            self.manager.add_source(source)
+
+    async def _peers(self) -> PeerServices | None:
+        """What this host has to do with others; None where it is to have nothing. Imported only
+        where it is wanted: it needs some ten megabytes.
+
+        Raises `PeerRefused`.
+        """
+        if not self.config.peers.enabled:
+            return None
+        from nondum.host.peers.peer_services import PeerServices
+
+        return await PeerServices.open(
+            self.config,
+            self.folders,
+            self.workers,
+            self.catalogue,
+            self.bus.emit,
+            lambda: self.mind,
+            self.stopping.stop,
+            lambda words: self.answering.own(words),
+            self.executor.children,
+            self.executor.judged_by,
+        )
+
+    def _make_mind(self) -> None:
+        config, planning = self.config, self.config.planning
+        patience = Patience(establish_s=planning.establish_s, finish_s=planning.finish_s)
+        self.mind = Mind(
+            config.host.name,
+            self.peers.calls if self.peers else self.workers,
+            _planners(config, self.extensions, self.folders.planning),
+            emit=self.bus.emit,
+            ask=self.workers.ask,
+            deadline_s=planning.deadline_s,
+            patience=patience,
+            system_tree=load_system_tree(config.host.system_tree),
+        )
+
+    def _make_followers(self) -> None:
+        """What follows events, in the order in which it is told of them."""
+        snapshot, emit = self.catalogue.snapshot, self.bus.emit
+        self.news = News()
+        self.software = Software(snapshot, self.mind.people.tell)
+        self.clock = ClockWatch(lambda: self.executor.trust.trust, emit)
+        amounts = self.executor.installation.amounts
+        self.refusal_retry = RefusalRetry(snapshot, amounts, emit, lambda: self.places())
+        self.bus.subscribe(_Listener(self.catalogue, self.mind, self.workers).on_event)
+        if self.peers is not None:
+            self.bus.subscribe(self.peers.on_event)
+        for follower in (self.news, self.software, self.service, self.counter):
+            self.bus.subscribe(follower.on_event)
+
+    def _make_conversation(self) -> None:
+        ask = self.peers.asking.ask if self.peers else None
+        self.answering = Answering(
+            self.mind, lambda: self.catalogue.snapshot().payloads, self.workers.busy, ask
+        )
+        self.conversation = Conversation(
+            self.mind,
+            self.workers.pids,
+            lambda words: self.orders.take_words(words),
+            self.answering.answer,
+        )
+
+    def _make_feedback(self) -> None:
+        """What extensions show and follow."""
+        snapshot, told = self.catalogue.snapshot, self.mind.people.newest
+        host = Host(self.config, self.folders.root, snapshot, self.conversation.say, told)
+        for listener in self.extensions.asked("listeners", host=host):
+            self.bus.subscribe(listener)
+        self.feedback = feedback_parts.made(
+            self.config.feedback,
+            self.catalogue,
+            self.mind,
+            self.places,
+            lambda: self.goal_files.state_reasons,
+            self.extensions.asked("feedback_outputs", host=host),
+            self.news.look_again,
+        )
+        self.bus.subscribe(self.feedback.on_event)
+
+    def _make_orders(self) -> None:
+        stop_all = _stop_all(self.peers, self.stopping)
+        self.stop_button = StopButton(self.config.stop, lambda: _pressed(self.mind, stop_all))
+        self.orders = Orders(
+            self.catalogue,
+            self.mind,
+            self.workers,
+            self.news,
+            self.bus,
+            self.stopping,
+            stop_all,
+            self.answering.answer,
+            _take(self.peers, self.mind, self.stopping),
+            self.config.planning.translate_s,
+            lambda: self.goal_files,
+            self.peers.goals if self.peers else None,
+        )
+        self.goal_files = GoalFiles(
+            self.catalogue.snapshot,
+            self.mind,
+            self.orders.translated,
+            self.bus.emit,
+            self.feedback.wake,
+            self.peers.goals if self.peers else None,
+        )
+        self.bus.subscribe(self.goal_files.on_event)
+
+    def _make_control(self) -> None:
+        trust, reserve_mb = self.executor.trust, self.config.install.reserve_mb
+        self.questions = Questions(
+            self.catalogue,
+            self.mind,
+            self.workers,
+            self.confinement_state,
+            self.news,
+            self.executor.installation.listing,
+            self.warnings,
+            self.places,
+            trust.vouched,
+            self.feedback.to_dict,
+            trust.summary,
+            self.peers.goals if self.peers else None,
+            lambda: machine.look(self.folders.root, reserve_mb),
+            lambda: slot_problems(self.devices),
+        )
+        trust_orders = TrustOrders(trust, self.bus.emit)
+        self.control = ControlServer(
+            self.config.host.control,
+            verbs.answering(self.questions, self.orders, trust_orders, self.peers),
+            verbs.following(self.questions, self.orders, self.peers),
+        )
+
+    def places(self) -> Mapping[str, str]:
+        """The payloads that run on peers: key → name of the peer."""
+        return self.peers.placement.places() if self.peers else {}
+
+    def warnings(self) -> tuple[str, ...]:
+        """What every status warns of."""
         return (
-            *executor.trust.warnings,
-            *map(str, clock.problems),
-            *_warnings(catalogue, safety[1]),
-            *counter.warnings(),
-            *crash_attribution.counts(catalogue.snapshot()),
-            *confinement_state.warnings(),
-            *feedback.warnings,
-            *stop_hook.warnings,
-            *stop_button.warnings,
-            *map(str, cgroups.problems()),
-            *map(str, extensions.problems),
-            *map(str, (*slot_problems(drives), *slot_problems(devices))),
-            *of_peers,
+            *self.executor.trust.warnings,
+            *map(str, self.clock.problems),
+            *_warnings(self.catalogue, self.why_safe),
+            *self.counter.warnings(),
+            *crash_attribution.counts(self.catalogue.snapshot()),
+            *self.confinement_state.warnings(),
+            *self.feedback.warnings,
+            *self.stop_hook.warnings,
+            *self.stop_button.warnings,
+            *map(str, self.cgroups.problems()),
+            *map(str, self.extensions.problems),
+            *map(str, (*slot_problems(self.drives), *slot_problems(self.devices))),
+            *(self.peers.warnings if self.peers else ()),
         )
 
-    elsewhere = neighbours.goals if neighbours else None
-    places = neighbours.placement.places if neighbours else dict
-    amounts = executor.installation.amounts
-    trying_again = RefusalRetry(catalogue.snapshot, amounts, bus.emit, places)
-    vouched = executor.trust.vouched
-    take = _take(neighbours, mind, stopping)
-    answering = Answering(
-        mind,
-        lambda: catalogue.snapshot().payloads,
-        workers.busy,
-        neighbours.asking.ask if neighbours else None,
-    )
-    conversation = Conversation(
-        mind,
-        workers.pids,
-        lambda words: orders.take_words(words),
-        answering.answer,
-    )
-    host = Host(config, folders.root, catalogue.snapshot, conversation.say, mind.people.newest)
-    for listener in extensions.asked("listeners", host=host):
-        bus.subscribe(listener)
-    feedback: Feedback = feedback_parts.made(
-        config.feedback,
-        catalogue,
-        mind,
-        places,
-        lambda: goal_files.state_reasons,
-        extensions.asked("feedback_outputs", host=host),
-        news.look_again,
-    )
-    bus.subscribe(feedback.on_event)
-    questions = Questions(
-        catalogue,
-        mind,
-        workers,
-        confinement_state,
-        news,
-        listing,
-        warnings,
-        places,
-        vouched,
-        feedback.to_dict,
-        executor.trust.summary,
-        elsewhere,
-        lambda: machine.look(folders.root, config.install.reserve_mb),
-        lambda: slot_problems(devices),
-    )
-    trust = TrustOrders(executor.trust, bus.emit)
-    stop_button = StopButton(config.stop, lambda: _pressed(mind, stop_all))
-    stop_all, translate_s = _stop_all(neighbours, stopping), config.planning.translate_s
-    orders = Orders(
-        catalogue,
-        mind,
-        workers,
-        news,
-        bus,
-        stopping,
-        stop_all,
-        answering.answer,
-        take,
-        translate_s,
-        lambda: goal_files,
-        elsewhere,
-    )
-    goal_files: GoalFiles = GoalFiles(
-        catalogue.snapshot, mind, orders.translated, bus.emit, feedback.wake, elsewhere
-    )
-    bus.subscribe(goal_files.on_event)
-    control = ControlServer(
-        config.host.control,
-        verbs.answering(questions, orders, trust, neighbours),
-        verbs.following(questions, orders, neighbours),
-    )
-    await control.open()
-    log.info("host %s listens at %s", config.host.name, config.host.control)
-    try:
-        await workers.keep_spare()
-        if neighbours is not None:
-            await neighbours.start()
-        malloc.keep_what_is_loaded()
-        await _until(
-            stop,
-            manager.run(),
-            mind.run(),
-            backups.keep(catalogue.backups, lambda: catalogue.revision, config.backups.every_s),
-            software.run(),
-            counter.outlive(),
-            service.watched(
-                (
-                    Part("the component manager", lambda: bus.taken, lambda: bus.followed),
-                    Part("the mind", lambda: mind.ticks + 1, lambda: mind.ticks),
-                )
-            ),
-            service.told(
-                lambda: words(catalogue.snapshot(), mind.views.given(), places(), warnings()),
-                questions.changed,
-            ),
-            conversation.run(),
-            stop_button.run(),
-            feedback.run(),
-            goal_files.run(),
-            trying_again.run(),
-            clock.run(),
-            automatic_retry.hold(catalogue.snapshot, counter, bus.emit),
-            *(source.watch(bus.emit) for source in devices),
+    async def run(self, stop: asyncio.Event) -> None:
+        """Serve until `stop`, and leave everything safe."""
+        await self.control.open()
+        name, at = self.config.host.name, self.config.host.control
+        log.info("host %s listens at %s", name, at)
+        try:
+            await self.workers.keep_spare()
+            if self.peers is not None:
+                await self.peers.start()
+            malloc.keep_what_is_loaded()
+            await _until(stop, *self._tasks())
+        finally:
+            await self.control.close()
+            await self.stop_hook.close()
+            await self.mind.close()
+            if self.peers is not None:
+                await self.peers.close()
+            await self.workers.close()
+            await in_thread(self.cgroups.close)
+
+    def _tasks(self) -> Iterator[Coroutine[Any, Any, None]]:
+        """What runs as long as the host."""
+        catalogue, bus, mind = self.catalogue, self.bus, self.mind
+        every_s = self.config.backups.every_s
+        watched = (
+            Part("the component manager", lambda: bus.taken, lambda: bus.followed),
+            Part("the mind", lambda: mind.ticks + 1, lambda: mind.ticks),
         )
-    finally:
-        await control.close()
-        await stop_hook.close()
-        await mind.close()
-        if neighbours is not None:
-            await neighbours.close()
-        await workers.close()
-        await in_thread(cgroups.close)
 
+        def status() -> str:
+            goals, warnings = mind.views.given(), self.warnings()
+            return words(catalogue.snapshot(), goals, self.places(), warnings)
 
-async def _neighbours(
-    config: HostConfig,
-    folders: Folders,
-    workers: Workers,
-    catalogue: Catalogue,
-    bus: Bus,
-    mind: Callable[[], Mind],
-    stop: Callable[[], Stopped],
-    answer: Reply,
-    executor: Executor,
-) -> PeerServices | None:
-    """What this host has to do with others; None where it is to have nothing. Imported only where
-    it is wanted: it needs some ten megabytes.
-
-    Raises `PeerRefused`.
-    """
-    if not config.peers.enabled:
-        return None
-    from nondum.host.peers.peer_services import PeerServices
-
-    return await PeerServices.open(
-        config,
-        folders,
-        workers,
-        catalogue,
-        bus.emit,
-        mind,
-        stop,
-        answer,
-        executor.children,
-        executor.judged_by,
-    )
+        yield self.manager.run()
+        yield mind.run()
+        yield backups.keep(catalogue.backups, lambda: catalogue.revision, every_s)
+        yield self.software.run()
+        yield self.counter.outlive()
+        yield self.service.watched(watched)
+        yield self.service.told(status, self.questions.changed)
+        yield self.conversation.run()
+        yield self.stop_button.run()
+        yield self.feedback.run()
+        yield self.goal_files.run()
+        yield self.refusal_retry.run()
+        yield self.clock.run()
+        yield automatic_retry.hold(catalogue.snapshot, self.counter, bus.emit)
+        for source in self.devices:
+            yield source.watch(bus.emit)
 
 
 def _cgroups(folders: Folders) -> Cgroups:

@@ -75,13 +75,29 @@ class PeerServices:
     ) -> None:
         """Use `open`. `mind` is asked for once the host runs; `stop` stops this host, `answer`
         answers what is asked about it."""
-        host = config.host.name
         self.trust_store = trust_store
         self._tasks: set[asyncio.Task[None]] = set()
         self._troubles: list[str] = []
         self._listens = listens(config.peers)
-        self._host, self._emit, self._mind = host, emit, mind
+        self._host, self._emit, self._mind = config.host.name, emit, mind
         self._movable = frozenset(config.peers.offer_actuators)
+        self.requests = Dispatcher()
+        self._make_serving(workers, catalogue)
+        self._make_fleet(config, workers, catalogue, compute)
+        self.view = self._made_view(catalogue)
+        self._streams = StreamRequests(
+            bridge, workers.streams, self.peering, self.fleet, self._hints
+        )
+        self._streams.serve(self.requests)
+        self.trust = self._made_trust_orders(is_development=config.peers.development)
+        self._make_goals(config, stop, answer)
+        self.placement = placement
+        placement.serve(self.requests)
+        self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
+        self.calls = AllCalls(workers, self._remote)
+
+    def _make_serving(self, workers: Workers, catalogue: Catalogue) -> None:
+        """What peers may have carried out here."""
         self.serving = Serving(
             workers,
             catalogue.snapshot,
@@ -90,17 +106,22 @@ class PeerServices:
             self._own_uses,
             self._on_taken,
         )
-        clock = asyncio.get_running_loop().time
-        self._strangers = RejectedHosts(emit, clock)
-        self._name_conflicts = NameConflicts(host, clock, self._hints)
-        self.requests = Dispatcher()
         self.requests.add("behave", self.serving.behave, self.serving.orphaned)
         self.requests.hear("values", self.serving.values)
+
+    def _make_fleet(
+        self, config: HostConfig, workers: Workers, catalogue: Catalogue, compute: Compute
+    ) -> None:
+        """The other hosts, how they are found, and what is shared with them."""
+        host, own = config.host.name, self._own_uses
+        clock = asyncio.get_running_loop().time
+        self._strangers = RejectedHosts(self._emit, clock)
+        self._name_conflicts = NameConflicts(host, clock, self._hints)
         self.finder: PeerFinder | None = None
         self.fleet = fleet_of(
             config,
-            trust_store.identity(development=config.peers.development),
-            trust_store.trust,
+            self.trust_store.identity(development=config.peers.development),
+            self.trust_store.trust,
             self.requests,
             on_event=self._on_fleet,
             find=lambda mesh: self._find(mesh, config.peers),
@@ -108,57 +129,47 @@ class PeerServices:
         self.peering = Peering(
             host,
             self.fleet,
-            emit,
+            self._emit,
             snapshot=catalogue.snapshot,
             policy=self._policy,
             claims=workers.claims,
-            taken=lambda: {**dict.fromkeys(self._own_uses(), host), **self.serving.taken},
+            taken=lambda: {**dict.fromkeys(own(), host), **self.serving.taken},
             about={"compute": compute, "reach": {"hosts": list(own_hosts(config))}},
         )
-        self.view = PeersView(
+
+    def _made_view(self, catalogue: Catalogue) -> PeersView:
+        return PeersView(
             security=self.fleet.security,
             snapshot=catalogue.snapshot,
             peers=lambda: self.fleet.peers,
-            trust=lambda: trust_store.trust,
+            trust=lambda: self.trust_store.trust,
             hints=self._hints,
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.fleet.refusals,
             links_pid=lambda: self.fleet.links_pid if isinstance(self.fleet, Mesh) else None,
         )
-        self._streams = StreamRequests(
-            bridge, workers.streams, self.peering, self.fleet, self._hints
+
+    def _made_trust_orders(self, *, is_development: bool) -> TrustOrders:
+        pairing = PairingRequests(
+            self.trust_store,
+            announce=self._announce_pairing,
+            candidates=self._hints,
+            known=lambda: {peer.key: peer.name for peer in self.fleet.peers.values()},
+            is_development=is_development,
         )
-        self._streams.serve(self.requests)
-        self.trust = TrustOrders(
-            trust_store,
-            PairingRequests(
-                trust_store,
-                announce=self._announce_pairing,
-                candidates=self._hints,
-                known=lambda: {peer.key: peer.name for peer in self.fleet.peers.values()},
-                is_development=config.peers.development,
-            ),
-            self.view.known,
-        )
-        self.goals = Goals(
-            host,
-            mind,
-            self.peering,
-            self.peering.names,
-            stop,
-            accepts=config.peers.accept_goals,
-        )
-        self.asking = Asking(self.peering, self.peering.names, answer)
+        return TrustOrders(self.trust_store, pairing, self.view.known)
+
+    def _make_goals(self, config: HostConfig, stop: Callable[[], Stopped], answer: Reply) -> None:
+        """Goals that people give here for peers, and there for this host; questions likewise."""
+        names, accepts = self.peering.names, config.peers.accept_goals
+        self.goals = Goals(self._host, self._mind, self.peering, names, stop, accepts=accepts)
+        self.asking = Asking(self.peering, names, answer)
         self.requests.add(asking.METHOD, self.asking.serve)
         self.requests.add("goal.ask", self.goals.serve_ask)
         self.requests.add("goal.give", self.goals.serve_give)
         self.requests.add("goal.again", self.goals.serve_again)
         self.requests.hear("goal.news", self.goals.hear_news)
         self.requests.hear("goal.standing", self.goals.on_goal_status)
-        self.placement = placement
-        placement.serve(self.requests)
-        self._remote = RemoteCalls(self.peering, emit, self.peering.claims)
-        self.calls = AllCalls(workers, self._remote)
 
     @classmethod
     async def open(

@@ -52,6 +52,11 @@ from nondum.sdk.errors import Problem
 
 def announced(event: Event, snapshot: Snapshot) -> str | None:
     """What is said of an event once `snapshot` has taken it in; None: nothing."""
+    told = _of_payload(event, snapshot) or _of_place(event, snapshot)
+    return told or _of_drive_or_worker(event) or _of_host(event)
+
+
+def _of_payload(event: Event, snapshot: Snapshot) -> str | None:
     match event:
         case PayloadRefused():
             told = f"{_name(event.payload, snapshot)} is refused{_stays(event.payload, snapshot)}"
@@ -81,6 +86,18 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case PayloadWithdrawn():
             stays = _stays(event.payload, snapshot)  # it was refused, or waited
             return f"{_name(event.payload, snapshot)} is withdrawn: {event.reason}{stays}"
+        case PayloadDistrusted():
+            name = _name(event.payload, snapshot)
+            return f"{name} is not trusted any more: {_joined(event.problems)}"
+        case PayloadDoubted(problems=problems) if problems:
+            name = _name(event.payload, snapshot)
+            return f"{name} goes on without trust: {_joined(problems)}"
+    return None
+
+
+def _of_place(event: Event, snapshot: Snapshot) -> str | None:
+    """A payload and the host that it runs on."""
+    match event:
         case PayloadSentAway():
             return f"{_name(event.payload, snapshot)} is to run on {event.host}, not here"
         case PayloadPlaced():
@@ -95,18 +112,31 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
         case PayloadTaken():
             name = _name(event.payload, snapshot)
             return f"{name} runs here for {event.host}, not there: {event.why}"
+    return None
+
+
+def _of_drive_or_worker(event: Event) -> str | None:
+    match event:
         case DriveFlapping() | DriveLeftAlone():
             return _joined(event.problems)
         case WorkerStrained() | WorkerFaulted() | InputAmbiguous():
             return _joined(event.problems)
         case ConditionEnded():
             return f"{event.component} goes on without a condition: {_joined(event.problems)}"
-        case PayloadDistrusted():
-            name = _name(event.payload, snapshot)
-            return f"{name} is not trusted any more: {_joined(event.problems)}"
-        case PayloadDoubted(problems=problems) if problems:
-            name = _name(event.payload, snapshot)
-            return f"{name} goes on without trust: {_joined(problems)}"
+        case DriveUnreadable():
+            return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
+        case DriveRetried(why=why) if why:
+            return f"drive {event.drive} is looked at again: {why}"
+        case DriveRead(flaws=flaws) if flaws:
+            return f"drive {event.drive}: {_joined(flaws)}"
+        case DriveRead(payloads=(), certificates=0, trust_files=0):
+            return f"drive {event.drive} carries no payload"
+    return None
+
+
+def _of_host(event: Event) -> str | None:
+    """Trust, clock, catalogue, safe mode and peers."""
+    match event:
         case TrustChanged():
             told = f"the trust file of {event.owner} has changed: version {event.version}"
             return f"{told}, from {event.source}"
@@ -116,12 +146,8 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return "the clock is set: it is believed again"
         case TrustFileRefused():
             return f"a trust file from {event.source} is not taken: {_joined(event.problems)}"
-        case DriveUnreadable():
-            return f"drive {event.drive} cannot be used: {_joined(event.problems)}"
         case SafeModeLeft(why=why):
             return f"safe mode is left: payloads are installed again{f', as {why}' if why else ''}"
-        case DriveRetried(why=why) if why:
-            return f"drive {event.drive} is looked at again: {why}"
         case CatalogueUnwritten() | CatalogueSetAside() | SafeModeEntered():
             return _joined(event.problems)
         case CatalogueWritten():
@@ -132,10 +158,6 @@ def announced(event: Event, snapshot: Snapshot) -> str | None:
             return _joined(event.problems)
         case PeerLeft():
             return f"the host {event.host} is gone: {event.reason}"
-        case DriveRead(flaws=flaws) if flaws:
-            return f"drive {event.drive}: {_joined(flaws)}"
-        case DriveRead(payloads=(), certificates=0, trust_files=0):
-            return f"drive {event.drive} carries no payload"
     return None
 
 

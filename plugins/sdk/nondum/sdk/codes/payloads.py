@@ -140,7 +140,7 @@ CODES = (
     Code(
         "PIP_FAILED",
         "pip could not install the wheels.",
-        'look at the line that is shown; `install.method = "venv"` does it without pip',
+        'look at the line that is shown; `install.method = "store"` does it without pip',
     ),
     Code(
         "SCHEMA_VERSION",
