@@ -186,20 +186,12 @@ def cpu_s(pid: int | str = "self") -> float:
 
 def machine() -> str:
     """The machine in one line, by what matters to the figures."""
-    model = next(
-        (
-            line.partition(":")[2].strip()
-            for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-            if line.startswith(("model name", "Model"))
-        ),
-        platform.machine(),
-    )
-    cores = len(os.sched_getaffinity(0))
+    processors = f"{len(os.sched_getaffinity(0))} × {platform.machine()}"
     release = platform.release().partition("-")[0]
     priority = f", niceness {os.nice(0)}" if os.nice(0) else ""
     if os.sched_getscheduler(0) == os.SCHED_IDLE:
         priority += ", only while nothing else ran (SCHED_IDLE)"
-    return f"{cores} × {model}, Linux {release}, CPython {platform.python_version()}{priority}"
+    return f"{processors}, Linux {release}, CPython {platform.python_version()}{priority}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

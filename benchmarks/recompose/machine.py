@@ -10,20 +10,11 @@ from pathlib import Path
 
 
 def describe(folder: Path) -> Iterator[str]:
-    """Processor, memory, system, and the file system of a folder."""
-    yield f"{os.cpu_count()} × {_field(Path('/proc/cpuinfo'), 'model name')}, {platform.machine()}"
-    memory_kib = int(_field(Path("/proc/meminfo"), "MemTotal").split()[0])
-    yield f"{memory_kib * 1024 / 1e9:.0f} GB of memory"
-    yield f"Linux {platform.release()}; {_system()}; Python {platform.python_version()}"
+    """Processors, system, and the file system of a folder."""
+    release = platform.release().partition("-")[0]
+    yield f"{os.cpu_count()} × {platform.machine()}"
+    yield f"Linux {release}; {_system()}; Python {platform.python_version()}"
     yield f"drive, store and images on {_file_system(folder)}"
-
-
-def _field(path: Path, name: str) -> str:
-    for line in path.read_text(encoding="utf-8").splitlines():
-        key, _, value = line.partition(":")
-        if key.strip() == name:
-            return value.strip()
-    return f"unknown {name}"
 
 
 def _system() -> str:

@@ -221,7 +221,8 @@ def _fast() -> str | None:
 
 
 def _machine() -> str:
-    return f"{platform.machine()}, Linux {platform.release()}, Python {platform.python_version()}"
+    release = platform.release().partition("-")[0]
+    return f"{platform.machine()}, Linux {release}, Python {platform.python_version()}"
 
 
 def _options() -> argparse.Namespace:

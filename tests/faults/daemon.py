@@ -65,6 +65,9 @@ QUICK = Timing(startup_s=30.0, settle_beats=1)
 _AT_REST = frozenset({Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})
 
 
+_Row = tuple[Any, str, str]
+
+
 class DeadlyCatalogue(Catalogue):
     """Obeys orders as it commits."""
 
@@ -73,32 +76,50 @@ class DeadlyCatalogue(Catalogue):
     told: int
     """Descriptor of the file `told`: it was opened before anything could fail."""
     entries = 0
+    held = 0
+    """Entries that no commit has written yet."""
     kept = 0
     """How often it has kept what lies beside the catalogue."""
     has_committed: asyncio.Event
-    """Set at each commit."""
+    """Set whenever there is another state."""
     is_scanned = False
     """Whether this daemon knows which drives are plugged in."""
 
     async def commit(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
         passed, parts = list(self._passed(entries)), list(self._components_passed(entries))
-        when, *row = self.orders.get("kill", ("", "", ""))
-        rows = [[step.name, event] for step, event, _ in passed]
-        is_deadly = row in [*rows, *([state, event] for state, event, _ in parts)]
-        if is_deadly and when == "BEFORE":
-            os.kill(os.getpid(), signal.SIGKILL)
+        self._die_if("BEFORE", passed, parts)
         await super().commit(after, entries)
-        self.entries += len(entries)
+        self.entries += self.held + len(entries)
+        self.held = 0
         self.is_scanned |= any(entry.event == "DrivesScanned" for entry in entries)
-        self.has_committed.set()
         self.tell(f"committed {self.boot} {self.entries} {after.revision}")
+        self._follow(after, passed, parts)
+
+    def hold(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
+        passed, parts = list(self._passed(entries)), list(self._components_passed(entries))
+        self._die_if("BEFORE", passed, parts)
+        super().hold(after, entries)
+        self.held += len(entries)
+        self._follow(after, passed, parts)
+
+    def _follow(self, after: HostState, passed: Sequence[_Row], parts: Sequence[_Row]) -> None:
+        """What is ordered after a state was taken, on disk or in memory."""
+        self.has_committed.set()
+        self._die_if("AFTER", passed, parts)
         states = {drive.state.name for drive in after.drives.values()}
-        if is_deadly or self.orders.get("kill_while") in states:
+        if self.orders.get("kill_while") in states:
             os.kill(os.getpid(), signal.SIGKILL)
         for step, event, payload in passed:
             self._nudge(ROWS[step, event].to.name, payload)
         for _, event, to in parts:
             self._nudge(f"{to}-{event}", "")
+
+    def _die_if(self, moment: str, passed: Sequence[_Row], parts: Sequence[_Row]) -> None:
+        when, *row = self.orders.get("kill", ("", "", ""))
+        rows = [[step.name, event] for step, event, _ in passed]
+        rows += [[state, event] for state, event, _ in parts]
+        if when == moment and row in rows:
+            os.kill(os.getpid(), signal.SIGKILL)
 
     def tell(self, line: str) -> None:
         """Put a line into `told`, with the length of the disk's log, if there is one."""

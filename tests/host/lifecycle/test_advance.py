@@ -24,7 +24,7 @@ from nondum.host.core import effects, events
 from nondum.host.core.events import Event
 from nondum.host.core.records import ComponentState, DriveState, Step
 from nondum.host.core.state import HostState
-from nondum.host.core.transitions import COMPONENT_TRANSITIONS, RECOVERY, TRANSITIONS
+from nondum.host.core.transitions import COMPONENT_TRANSITIONS, HELD, RECOVERY, TRANSITIONS
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.crash_attribution import ATTEMPTS
 from nondum.host.lifecycle.recovery import recover
@@ -347,3 +347,10 @@ def sound(state: HostState) -> bool:
     ids = [id for p in state.payloads.values() if p.step is Step.ACTIVE for id in p.components]
     assert sorted(ids) == sorted(state.components)
     return True
+
+
+@pytest.mark.parametrize(("step", "event"), [row for row in TRANSITIONS if row[1] in HELD])
+def test_progress_that_is_held_is_what_recovery_does_not_tell_apart(
+    step: Step, event: type[Event]
+) -> None:
+    assert RECOVERY[TRANSITIONS[step, event].to] == RECOVERY[step]

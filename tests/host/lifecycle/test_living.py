@@ -280,3 +280,13 @@ class SlowSource:
         await self.may_go_on.wait()
         emit(DrivesScanned(self.kind, ("a",)))
         await asyncio.Event().wait()
+
+
+async def test_a_plug_is_four_commits_at_most(tmp_path: Path) -> None:
+    """Inserted, found, stored, active: what recovery tells apart."""
+    lamp(tmp_path / "drive")
+    async with host_in_process(tmp_path) as host:
+        before = host.catalogue.commits
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        assert host.catalogue.commits - before <= 4

@@ -6,7 +6,7 @@ from hypothesis import assume
 from hypothesis import strategies as st
 from tests.planning.search.random_tasks import tasks
 
-from nondum.planning.ground.delete_relaxation import reachable
+from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.ground.progression import State, progress, start
 from nondum.planning.search import encoding
 from nondum.planning.search.encoding import Encoded, encode
@@ -20,7 +20,7 @@ Walk = tuple[GroundTask, Encoded, list[tuple[State, encoding.State]]]
 def walks(draw: st.DrawFn) -> Walk:
     """A task, the same encoded, and the states of a way through both, side by side."""
     task = draw(tasks())
-    assume(task.goal <= reachable(task))
+    assume(task.goal <= reachable_facts(task))
     encoded = encode(task)
     way = [(start(task), encoded.init)]
     for _ in range(draw(st.integers(0, 4))):

@@ -108,6 +108,12 @@ class Catalogue:
                 self._wrote(after)
         await work
 
+    def hold(self, after: HostState, entries: Sequence[JournalEntry]) -> None:
+        """Make `after` the state, in memory only: recovery does the same with it and with the last
+        one on disk. The next commit writes it, too."""
+        self._owed.extend(entries)
+        self._take(after)
+
     def owe(self, after: HostState, entries: Sequence[JournalEntry], why: Exception) -> None:
         """Continue with a state that cannot be written: the next daemon may not find it.
 

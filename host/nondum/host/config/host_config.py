@@ -114,7 +114,7 @@ class InstallSection:
 
 @dataclass(frozen=True, slots=True)
 class WorkersSection:
-    """Limits of one worker, unless its payload asks for less."""
+    """Limits of each worker: the same for all, and no payload changes them."""
 
     memory_mb: int = 2048
     """Memory of all its processes, where the machine has the memory cgroup; else the data of each.

@@ -76,6 +76,17 @@ TRANSITIONS: _Rows = {
 }
 """(step, event) → transition. What is not here is ignored: it comes from an earlier life."""
 
+HELD: frozenset[type[Event]] = frozenset(
+    {
+        events.PayloadCopied,
+        events.PayloadVerified,
+        events.PayloadStaged,
+        events.ComponentsProbed,
+    }
+)
+"""Progress that is not committed by itself: recovery does the same before it and after it. The next
+commit writes it, too."""
+
 RECOVERY: Mapping[Step, Transition] = {
     Step.RECEIVED: Transition(Step.GONE),
     Step.COPIED: Transition(Step.GONE),

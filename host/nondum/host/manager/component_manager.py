@@ -28,6 +28,7 @@ from nondum.host.core.events import (
 from nondum.host.core.journal_entry import entries_of
 from nondum.host.core.records import INSTALLED, Moment, Safety, Snapshot
 from nondum.host.core.state import HostState
+from nondum.host.core.transitions import HELD
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.lifecycle.rebuilding import noting_all
@@ -182,6 +183,9 @@ class ComponentManager:
         if after is before and not told and unwritten is None:
             return
         entries = list(entries_of(told, before, after, catalogue.boot))
+        if unwritten is None and told and all(type(event) in HELD for event, _ in told):
+            catalogue.hold(after, entries)
+            return
         tries_left = COMMIT_TRIES if unwritten is None else 0
         while True:
             try:

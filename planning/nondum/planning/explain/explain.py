@@ -9,10 +9,10 @@ from nondum.planning.explain.cause import Cause, Lack
 from nondum.planning.explain.conflict import Conflict, Search, conflict_of
 from nondum.planning.explain.missing import Outlook
 from nondum.planning.explain.tracing import Tracer
+from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.ground.exploration import explore
 from nondum.planning.ground.literal_task import LiteralTask, expanded
 from nondum.planning.ground.matching import Relations
-from nondum.planning.ground.reachable_facts import reached_in
 from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.claims import claims_of
 from nondum.planning.merge.contribution import Contribution
@@ -61,7 +61,7 @@ def explain(
     found = explore(part.merged, known, objects)
     literal_task = expanded(part.merged, found, goal)
     reachable = Relations()
-    for number in sorted(reached_in(literal_task)):
+    for number in sorted(reachable_facts(literal_task)):
         reachable.add(*found.table.facts[number])
     lasting = frozenset(map(found.table.text, literal_task.believed - _deleted(literal_task)))
     causes = Tracer(part.merged, Outlook(reachable, lasting, found.members)).causes(goal)

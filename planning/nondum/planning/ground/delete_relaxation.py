@@ -1,29 +1,67 @@
-"""What a ground task can reach if nothing were ever deleted: the cheap proof of impossibility."""
+"""What can become true if nothing were ever deleted: the cheap proof of impossibility."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias
 
 from nondum.planning.ground.progression import start
 from nondum.sdk.planner import AlreadyTrue, GroundTask, Unsolvable
 
+if TYPE_CHECKING:
+    from nondum.planning.ground.literal_task import LiteralTask
 
-def reachable(task: GroundTask) -> frozenset[int]:
+Giver: TypeAlias = tuple[frozenset[int], frozenset[int]]
+"""The facts that an action, a conditional effect or a rule needs, and those that it makes true."""
+
+
+def reachable_facts(task: GroundTask | LiteralTask) -> frozenset[int]:
     """The facts that some sequence of actions makes true, deletes ignored.
 
-    The complement of a derived fact counts as reachable.
+    A negative condition counts as met, and the complement of a derived fact as reachable.
     """
+    if isinstance(task, GroundTask):
+        complements = {other for layer in task.derived for _, other in layer.complements}
+        return _fixpoint(task.init | complements, _givers(task))
+    return _fixpoint(task.believed, _positive_givers(task))
+
+
+def reachable_part(task: LiteralTask) -> LiteralTask:
+    """The task without the actions and rules whose conditions are out of reach."""
+    reached = reachable_facts(task)
+    return replace(
+        task,
+        actions=tuple(a for a in task.actions if a.condition.positive <= reached),
+        rules=tuple(rule for rule in task.rules if rule.body.positive <= reached),
+    )
+
+
+def quick_answer(task: GroundTask) -> AlreadyTrue | Unsolvable | None:
+    """The answer that needs no search: the goal holds, or cannot be reached even without deletes.
+
+    None: a planner must look.
+    """
+    if task.goal <= start(task):
+        return AlreadyTrue()
+    unreached = task.goal - reachable_facts(task)
+    if unreached:
+        return Unsolvable("relaxed", tuple(task.facts[index] for index in sorted(unreached)))
+    return None
+
+
+def _fixpoint(facts: Iterable[int], givers: Iterable[Giver]) -> frozenset[int]:
+    """The facts, and all that the givers make of them."""
     needing: defaultdict[int, list[int]] = defaultdict(list)
     missing: list[int] = []
     given: list[frozenset[int]] = []
-    for index, (condition, add) in enumerate(_changes(task)):
-        missing.append(len(condition))
-        given.append(add)
-        for needed in condition:
+    for index, (needs, gives) in enumerate(givers):
+        missing.append(len(needs))
+        given.append(gives)
+        for needed in needs:
             needing[needed].append(index)
-    reached = set(task.init)
-    reached.update(other for layer in task.derived for _, other in layer.complements)
+    reached = set(facts)
     waiting = list(reached)
     ready = [index for index, count in enumerate(missing) if count == 0]
     while waiting or ready:
@@ -39,8 +77,7 @@ def reachable(task: GroundTask) -> frozenset[int]:
     return frozenset(reached)
 
 
-def _changes(task: GroundTask) -> Iterator[tuple[frozenset[int], frozenset[int]]]:
-    """Everything that makes facts true: what it needs, and what it gives."""
+def _givers(task: GroundTask) -> Iterator[Giver]:
     for action in task.actions:
         yield action.precondition, action.add
         for effect in action.conditional:
@@ -51,14 +88,10 @@ def _changes(task: GroundTask) -> Iterator[tuple[frozenset[int], frozenset[int]]
             yield rule.body, frozenset((rule.head,))
 
 
-def quick_answer(task: GroundTask) -> AlreadyTrue | Unsolvable | None:
-    """The answer that needs no search: the goal holds, or cannot be reached even without deletes.
-
-    None: a planner must look.
-    """
-    if task.goal <= start(task):
-        return AlreadyTrue()
-    unreached = task.goal - reachable(task)
-    if unreached:
-        return Unsolvable("relaxed", tuple(task.facts[index] for index in sorted(unreached)))
-    return None
+def _positive_givers(task: LiteralTask) -> Iterator[Giver]:
+    for action in task.actions:
+        yield action.condition.positive, action.add
+        for change in action.changes:
+            yield action.condition.positive | change.condition.positive, change.add
+    for rule in task.rules:
+        yield rule.body.positive, frozenset((rule.head,))

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT, work_for
+from nondum.planning.ground.delete_relaxation import reachable_part
 from nondum.planning.ground.expansion import Disjunction, Expander
 from nondum.planning.ground.instances import Change, Exploration, Instance
-from nondum.planning.ground.reachable_facts import reachable
 from nondum.planning.ground.work_limit import Spending
 from nondum.planning.merge.derivation import strata_of
 from nondum.planning.merge.domain import Merged, bind
@@ -92,7 +92,7 @@ class _Expansion:
         literal_task = LiteralTask(
             tuple(actions), tuple(rules), len(self._groups) + 1, wanted, self._found.believed
         )
-        return reachable(literal_task) if self._was_expanded(goal) else literal_task
+        return reachable_part(literal_task) if self._was_expanded(goal) else literal_task
 
     def _was_expanded(self, goal: GoalExpr) -> bool:
         """Whether exploring could not see all conditions."""

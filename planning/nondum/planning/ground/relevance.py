@@ -10,42 +10,42 @@ from typing import TypeAlias
 from nondum.planning.ground.literal_task import LiteralAction, LiteralRule, LiteralTask
 from nondum.planning.pddl.literals import Literals
 
-Wish: TypeAlias = tuple[int, bool]
+Literal: TypeAlias = tuple[int, bool]
 """A fact, and whether it is to be true."""
 
 
 def helpful(literal_task: LiteralTask) -> LiteralTask:
     """The task without actions and rules that give nothing which anything else asks for.
 
-    An effect that may undo something asked for makes it a wish that its condition does not hold.
+    Of an effect that may undo something asked for, it is asked that its condition does not hold.
     """
-    givers: defaultdict[Wish, list[int]] = defaultdict(list)
+    givers: defaultdict[Literal, list[int]] = defaultdict(list)
     for index, action in enumerate(literal_task.actions):
-        for wish in _given(action):
-            givers[wish].append(index)
+        for literal in _given(action):
+            givers[literal].append(index)
     rules: defaultdict[int, list[LiteralRule]] = defaultdict(list)
     for rule in literal_task.rules:
         rules[rule.head].append(rule)
-    waiting = list(_wishes(literal_task.goal))
+    waiting = list(_literals(literal_task.goal))
     asked = set(waiting)
     kept: set[int] = set()
 
-    def ask(wishes: Iterator[Wish]) -> None:
-        for wish in wishes:
-            if wish not in asked:
-                asked.add(wish)
-                waiting.append(wish)
+    def ask(literals: Iterator[Literal]) -> None:
+        for literal in literals:
+            if literal not in asked:
+                asked.add(literal)
+                waiting.append(literal)
 
     while waiting:
-        fact, is_true = wish = waiting.pop()
+        fact, is_true = literal = waiting.pop()
         for rule in rules.get(fact, ()):
-            ask(_wishes(rule.body if is_true else _opposite(rule.body)))
-        for index in givers.get(wish, ()):
+            ask(_literals(rule.body if is_true else _opposite(rule.body)))
+        for index in givers.get(literal, ()):
             action = literal_task.actions[index]
             if index not in kept:
                 kept.add(index)
-                ask(_wishes(action.condition))
-            ask(_asked_by_changes(action, wish))
+                ask(_literals(action.condition))
+            ask(_asked_by_changes(action, literal))
         for index in givers.get((fact, not is_true), ()):
             ask(_asked_against(literal_task.actions[index], (fact, not is_true)))
     asked_facts = {fact for fact, _ in asked}
@@ -57,7 +57,7 @@ def helpful(literal_task: LiteralTask) -> LiteralTask:
     )
 
 
-def _wishes(literals: Literals) -> Iterator[Wish]:
+def _literals(literals: Literals) -> Iterator[Literal]:
     yield from ((fact, True) for fact in literals.positive)
     yield from ((fact, False) for fact in literals.negative)
 
@@ -66,25 +66,25 @@ def _opposite(literals: Literals) -> Literals:
     return Literals(literals.negative, literals.positive)
 
 
-def _given(action: LiteralAction) -> set[Wish]:
-    wishes = {(fact, True) for fact in action.add} | {(fact, False) for fact in action.delete}
+def _given(action: LiteralAction) -> set[Literal]:
+    literals = {(fact, True) for fact in action.add} | {(fact, False) for fact in action.delete}
     for change in action.changes:
-        wishes |= {(fact, True) for fact in change.add}
-        wishes |= {(fact, False) for fact in change.delete}
-    return wishes
+        literals |= {(fact, True) for fact in change.add}
+        literals |= {(fact, False) for fact in change.delete}
+    return literals
 
 
-def _asked_by_changes(action: LiteralAction, wish: Wish) -> Iterator[Wish]:
-    """What the changes that give a wish ask for."""
-    fact, is_true = wish
+def _asked_by_changes(action: LiteralAction, literal: Literal) -> Iterator[Literal]:
+    """What the changes that give a literal ask for."""
+    fact, is_true = literal
     for change in action.changes:
         if fact in (change.add if is_true else change.delete):
-            yield from _wishes(change.condition)
+            yield from _literals(change.condition)
 
 
-def _asked_against(action: LiteralAction, harm: Wish) -> Iterator[Wish]:
+def _asked_against(action: LiteralAction, harm: Literal) -> Iterator[Literal]:
     """What keeps the changes that would undo something from happening."""
     fact, is_true = harm
     for change in action.changes:
         if fact in (change.add if is_true else change.delete):
-            yield from _wishes(_opposite(change.condition))
+            yield from _literals(_opposite(change.condition))

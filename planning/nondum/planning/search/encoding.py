@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from nondum.planning.ground.delete_relaxation import reachable
+from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.search.derivation import MaskLayer, Stage, stages_of
 from nondum.sdk.planner import GroundAction, GroundTask
 
@@ -81,7 +81,7 @@ def encode(task: GroundTask) -> Encoded:
 class _Encoder:
     def __init__(self, task: GroundTask) -> None:
         self._task = task
-        self._reached = reached = reachable(task)
+        self._reached = reached = reachable_facts(task)
         self._actions = [(i, a) for i, a in enumerate(task.actions) if a.precondition <= reached]
         self._rules = [[r for r in layer.rules if r.body <= reached] for layer in task.derived]
         pairs = [pair for layer in task.derived for pair in layer.complements]

@@ -23,7 +23,7 @@ from nondum.planning.pddl.normal import Condition, atoms_in
 from nondum.planning.pddl.syntax import And, Formula, Not, Or, Quantified, TypedName, terms_of
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
 
-Wish: TypeAlias = tuple[str, bool]
+SignedPredicate: TypeAlias = tuple[str, bool]
 """A predicate, and whether facts of it are to be true."""
 
 
@@ -31,8 +31,8 @@ Wish: TypeAlias = tuple[str, bool]
 class Schema:
     """An action or rule, as far as relevance goes."""
 
-    gives: frozenset[Wish]
-    asks: frozenset[Wish]
+    gives: frozenset[SignedPredicate]
+    asks: frozenset[SignedPredicate]
     types: frozenset[str]
     """Whatever else it acts upon must be of these."""
 
@@ -81,8 +81,8 @@ def relevant(
     )
 
 
-def _closure(goal: Condition, sketches: Iterable[Sketch]) -> tuple[set[Wish], set[str]]:
-    givers: defaultdict[Wish, list[Schema]] = defaultdict(list)
+def _closure(goal: Condition, sketches: Iterable[Sketch]) -> tuple[set[SignedPredicate], set[str]]:
+    givers: defaultdict[SignedPredicate, list[Schema]] = defaultdict(list)
     for sketch in sketches:
         for schema in sketch.schemas:
             for wish in schema.gives:
@@ -101,7 +101,7 @@ def _closure(goal: Condition, sketches: Iterable[Sketch]) -> tuple[set[Wish], se
 
 def _may_help(
     sketch: Sketch,
-    wishes: set[Wish],
+    wishes: set[SignedPredicate],
     asked: set[str],
     types: set[str],
     named: set[str],
@@ -144,7 +144,7 @@ def _of_rule(rule: DerivedRule) -> Schema:
     return Schema(gives, frozenset(asks), frozenset(types))
 
 
-def _wishes(condition: Condition) -> Iterator[Wish]:
+def _wishes(condition: Condition) -> Iterator[SignedPredicate]:
     for part in condition.parts():
         for atom, is_positive in atoms_in(part):
             yield atom.predicate, is_positive
