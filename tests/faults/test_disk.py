@@ -150,7 +150,7 @@ async def test_disk_without_inodes_is_told(mounted: Callable[[str], Path], tmp_p
         host.plug(tmp_path / "drive")
         record = await host.until_step(LAMP_ID, Step.REFUSED)
         (problem,) = record.problems
-        assert (problem.code, "files" in problem.message) == ("DISK_FULL", True)
+        assert (problem.code, "inodes" in problem.message) == ("DISK_FULL", True)
         host.pull()
         await host.until_gone(LAMP_ID)
         assert not left_over(host.folders)

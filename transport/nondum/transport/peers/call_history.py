@@ -54,7 +54,7 @@ class CallHistory:
     def take(self, number: int) -> Seen:
         """Look at a call that came; a new one is running from now on.
 
-        >>> once = Once()
+        >>> once = CallHistory()
         >>> once.take(1), once.take(1), once.answered(1, b"yes"), once.take(1)
         (<Seen.NEW: 'new'>, <Seen.RUNNING: 'running'>, None, <Seen.ANSWERED: 'answered'>)
         """
