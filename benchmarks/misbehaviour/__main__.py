@@ -74,8 +74,8 @@ same for as long, in a control group with the same limits, started by hand and k
 what that does to the others is this machine's kernel. The rounds of a
 way are put together to {repeats} percentiles; medians of these (lowest-highest), *times* is pair by
 pair. *Slowest* is the slowest call of all rounds. *Lost* counts the frames that were made and not
-seen, in all rounds. The aim, 1.2 times and no frame lost, is missed where a plain process
-misses it, too.
+seen, in all rounds; frames that are lost beside the plain process are not counted. The aim is 1.2
+times and no frame lost.
 
 {peace}
 

@@ -108,7 +108,7 @@ _ALL = (
     ),
     Campaign(
         "machines",
-        "Every scenario of the laboratory on emulated machines",
+        "Every scenario of the laboratory on emulated x86_64 machines",
         (
             "packaging",
             *(f"{HOST}/{name}" for name in ("sources", "sandbox", "service", "people", "peers")),

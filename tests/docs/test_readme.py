@@ -1,112 +1,60 @@
-"""The front page's session, typed as it is printed, prints what it shows."""
+"""The front page is short, and its plugin of ten lines is whole: hosts plan with it."""
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
-from tests.kit.until import until
+
+from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.merge import merge
+from nondum.planning.words.phrases import phrasebook
+from nondum.sdk import describe, load
+from nondum.sdk.bench import WorkerFactory
 
 ROOT = Path(__file__).parents[2]
-
-pytestmark = [pytest.mark.daemon, pytest.mark.timeout(300)]
-
-
-def session() -> Iterator[tuple[str, str]]:
-    """Every command of the page's terminals, and what it shows of its output."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for block in re.findall(r"^```console\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
-        yield from re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE)
-
-
-def is_as_shown(shown: str, printed: str) -> bool:
-    """Whether an output is the one on the page, where `…` and decimal numbers stand for any."""
-    pattern = re.escape(shown).replace("…", ".*")
-    pattern = re.sub(r"\d+\\\.\d+", r"\\d+\\.\\d+", pattern)
-    # Past a minute pytest says it twice: `70.36s (0:01:10)`.
-    pattern = pattern.replace(r"\d+\.\d+s", r"\d+\.\d+s(?: \([\d:]+\))?")
-    return re.fullmatch(pattern, printed, re.DOTALL) is not None
+PAGE = (ROOT / "README.md").read_text(encoding="utf-8")
+MAX_WORDS = 900
+MAX_LINES = 10
 
 
 @pytest.fixture
-def folder() -> Iterator[Path]:
-    """One with a short name, as homes have: the path of a socket may have 107 characters."""
-    with tempfile.TemporaryDirectory(prefix="nd-") as name:
-        yield Path(name)
+def source() -> str:
+    """The page's one block of Python."""
+    (found,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    return str(found)
 
 
 @pytest.fixture
-def environment(folder: Path) -> dict[str, str]:
-    """A checkout, a user's home, and the environment that the set-up makes."""
-    (folder / "plugins").symlink_to(ROOT / "plugins")
-    (folder / "home").mkdir()
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    kept = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(("XDG_", "PYTEST_", "COLUMNS"))  # readline sets the last
-    }
-    return kept | {"HOME": str(folder / "home"), "PATH": path, "PYTHONUNBUFFERED": "1"}
+def plugin(source: str) -> ModuleType:
+    module = ModuleType("blinker")
+    exec(compile(source, "README.md", "exec"), vars(module))  # the page's own code
+    return module
 
 
-def test_the_session_goes_as_it_is_printed(folder: Path, environment: dict[str, str]) -> None:
-    host: subprocess.Popen[str] | None = None
-    try:
-        for command, shown in session():
-            if "activate" in command:
-                continue
-            if command.startswith("nondum host run"):
-                host = start(command, shown, folder, environment)
-            else:
-                follow(command, shown, folder, environment)
-        assert host is not None
-    finally:
-        if host is not None:
-            host.terminate()
-            host.communicate()
+def test_page_is_short() -> None:
+    assert len(PAGE.split()) <= MAX_WORDS
 
 
-def start(command: str, shown: str, folder: Path, env: dict[str, str]) -> subprocess.Popen[str]:
-    """Run what keeps running, until it has said what the page shows."""
-    host = subprocess.Popen(
-        ["bash", "-c", f"exec {command}"],
-        cwd=folder,
-        env=env,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-    )
-    assert host.stdout is not None
-    printed = "".join(host.stdout.readline() for _ in shown.splitlines())
-    assert is_as_shown(shown, printed), printed
-    return host
+def test_plugin_has_ten_lines(source: str) -> None:
+    assert len(source.splitlines()) <= MAX_LINES
 
 
-def follow(command: str, shown: str, folder: Path, env: dict[str, str]) -> None:
-    """Run a command; where a host has yet to get there, ask again as a person would."""
-    asks = command.startswith(("nondum goals", "nondum components", "nondum why"))
-    printed = ""
+def test_plugin_works_on_the_bench(plugin: ModuleType, worker: WorkerFactory) -> None:
+    bench = worker(plugin)
+    bench.behave("blink", u="lamp", h="robot").assert_succeeded()
+    assert bench.logs
 
-    def is_there() -> bool:
-        nonlocal printed
-        done = subprocess.run(
-            ["bash", "-c", command],
-            cwd=folder,
-            env=env,
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
-        printed = done.stdout
-        return done.returncode == 0 and is_as_shown(shown, printed)
 
-    if asks:
-        until(f"$ {command}", is_there, evidence=lambda: printed)
-    else:
-        assert is_there(), f"$ {command}\n{printed}"
+def test_host_plans_with_the_plugin_and_understands_the_goal_of_the_page(
+    plugin: ModuleType,
+) -> None:
+    (words,) = re.findall(r'`nondum goal "(.+?)"`', PAGE)
+    description = describe(load(plugin, "blinker"))
+    brought = Contribution.from_description(description, host="rover", component="blinker")
+    merged = merge((brought,), "rover")
+    assert not merged.quarantined
+    assert str(phrasebook((brought,), merged).goal(words)) == "achieve (greeted rover)"
+    assert merged.domain.actions["blinker.blink"].behaviour == "blink"

@@ -147,7 +147,11 @@ def say(line: str) -> None:
 def _page(found: Mapping[str, Figures | None]) -> Iterator[str]:
     yield "# Drives: what was tried, and what it came to"
     yield ""
-    yield "Written by `python -m tests.faults.drive_figures hostile yanks crowd soak`."
+    shown_here = " ".join(name for name, figures in found.items() if figures is not None)
+    left_out = ", ".join(f"`{name}`" for name, figures in found.items() if figures is None)
+    yield f"Written by `python -m tests.faults.drive_figures {shown_here}`."
+    if left_out:
+        yield f"Not measured for this page: {left_out}."
     shown = {"hostile": _hostile, "yanks": _yanks, "crowd": _crowd, "soak": _soak}
     for name, show in shown.items():
         figures = found[name]

@@ -172,7 +172,7 @@ async def where_files_cannot_be_mapped_workers_share_a_user_and_it_is_told(
     """procfs is no place for files at all, let alone mapped ones."""
     found = confinement_probe.all_findings(Path("/proc"))[0]
     assert found.is_available and not found.has_users
-    assert "cannot be had" in found.reason
+    assert "not possible" in found.reason
 
 
 async def no_two_scratch_folders_have_one_user(tested: WorkersUnderTest) -> None:

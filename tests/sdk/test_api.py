@@ -77,7 +77,7 @@ def test_readme_plugin_works(worker: WorkerFactory) -> None:
     try:
         written: dict[str, Any] = {}
         exec(test, written)
-        written["test_blinks_twice"](worker)
+        written["test_blinks"](worker)
     finally:
         del sys.modules["blinker"]
 

@@ -134,7 +134,7 @@ async def test_behaviours_of_a_task_that_is_no_longer_ticked_are_halted(
     async with at_work(Robot(Planners([native]), system_tree=tree)) as robot:
         robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
         robot.mind.give(pddl=POINT, kind="maintain")
-        await robot.until_holding()
+        await clock.advance_until(robot.until_holding())
         above[0].is_asleep = True
         await clock.advance(LEASE_S + 1.0)
-        await robot.until(lambda: not robot.running)
+        await clock.advance_until(robot.until(lambda: not robot.running))

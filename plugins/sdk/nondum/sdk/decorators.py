@@ -7,21 +7,28 @@ checked here; `nondum.sdk.plugin.describe` checks everything and reports it at o
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from nondum.sdk.action_fragment import StatedEffect, with_host
 from nondum.sdk.description import Behaviour, Condition
 
 _Marked = TypeVar("_Marked", bound=Callable[..., Any])
 
 BEHAVIOUR_MARK = "__nondum_behaviour__"
+EFFECT_MARK = "__nondum_effect__"
 CONDITION_MARK = "__nondum_condition__"
+
+_SIGNATURE = re.compile(r"\s*\(\s*([^\s()]*)")
 
 
 def behaviour(
     name: str,
     *,
-    action: str,
+    action: str | None = None,
+    makes: str | None = None,
+    needs: str = "",
     lasting: bool = False,
     phrase: str | Sequence[str] | None = None,
     when_lost: str = "stop",
@@ -31,6 +38,14 @@ def behaviour(
     It carries out the action whose signature is `action`: `(point ?u - pointer ?h - host)`. Its
     parameters are `ctx` and then the action's, by name and in order; it gets the objects' names.
     A coroutine function runs on the worker's loop, a plain function in its own thread.
+
+    `name` may be the signature itself; then the behaviour has the action's name.
+
+    A fragment of the plugin declares the action; or `makes` states its effect in PDDL, `(lit ?h)`,
+    and the fragment is generated. Its precondition is `(ready ?u)`, `(on ?u ?h)` where a host is
+    among the parameters, and what `needs` adds. Where the effect or `needs` speaks of ?h, and the
+    signature does not, `?h - host` is its last parameter. What no fragment declares is declared:
+    predicates, and the type of ?u as a kind of unit.
 
     Returning is SUCCESS, raising `BehaviourFailed` is FAILURE, and so is any other error; being
     cancelled is being halted. A text that is returned is the answer to the person who gave the
@@ -44,9 +59,17 @@ def behaviour(
     """
     phrases = (phrase,) if isinstance(phrase, str) else tuple(phrase or ())
 
+    signature, called = action or "", name
+    if action is None and (found := _SIGNATURE.match(name)):
+        signature, called = name, found[1]
+    effect = StatedEffect(makes or "", needs) if needs or makes is not None else None
+    if effect:
+        signature = with_host(signature, effect)
+
     def mark(marked: _Marked) -> _Marked:
-        described = Behaviour(name, action, lasting, phrases, _first_line(marked), when_lost)
+        described = Behaviour(called, signature, lasting, phrases, _first_line(marked), when_lost)
         setattr(marked, BEHAVIOUR_MARK, described)
+        setattr(marked, EFFECT_MARK, effect)
         return marked
 
     return mark
@@ -70,6 +93,12 @@ def behaviour_of(marked: object) -> Behaviour | None:
     """The behaviour that a function, method or class is marked with."""
     found = getattr(marked, BEHAVIOUR_MARK, None)
     return found if isinstance(found, Behaviour) else None
+
+
+def effect_of(marked: object) -> StatedEffect | None:
+    """The effect that `@behaviour` states of a function's action."""
+    found = getattr(marked, EFFECT_MARK, None)
+    return found if isinstance(found, StatedEffect) else None
 
 
 def condition_of(marked: object) -> Condition | None:

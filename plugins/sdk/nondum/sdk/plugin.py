@@ -5,6 +5,7 @@ Everything wrong with a description is reported at once.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import re
@@ -17,8 +18,16 @@ from typing import Any
 import pluggy
 
 from nondum.sdk import hooks
-from nondum.sdk.decorators import behaviour_of, condition_of
-from nondum.sdk.description import WHEN_LOST, Behaviour, Condition, PluginDescription, Unit
+from nondum.sdk.action_fragment import StatedAction, generated_fragments
+from nondum.sdk.decorators import behaviour_of, condition_of, effect_of
+from nondum.sdk.description import (
+    WHEN_LOST,
+    Behaviour,
+    Condition,
+    Fragment,
+    PluginDescription,
+    Unit,
+)
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
 from nondum.sdk.raised import within_packages
 from nondum.sdk.signature import parse_signature
@@ -94,17 +103,22 @@ def load(target: str | object, distribution: str = "") -> Plugin:
 def describe(plugin: Plugin) -> PluginDescription:
     """Ask a plugin all that it says about itself.
 
-    Raises `WorkerFailed` (HOOK_FAILED, DESCRIPTION_INVALID, ACTION_SIGNATURE, BEHAVIOUR_PARAMETERS)
-    with everything that is wrong.
+    Fragments are the plugin's own, and one that is generated of the effects that its behaviours
+    state.
+
+    Raises `WorkerFailed` (HOOK_FAILED, DESCRIPTION_INVALID, ACTION_SIGNATURE, ACTION_EFFECT,
+    BEHAVIOUR_PARAMETERS) with everything that is wrong.
     """
     behaviours = tuple(behaviours_of(plugin).values())
+    fragments = _listed(plugin, "fragments")
+    generated, mistaken = _generated(behaviours, fragments)
     described = PluginDescription(
         name=plugin.distribution,
         version=plugin.version,
         summary=_summary(plugin),
         behaviours=tuple(_marks(behaviours, behaviour_of)),
         conditions=tuple(_marks(conditions_of(plugin).values(), condition_of)),
-        fragments=_listed(plugin, "fragments"),
+        fragments=(*fragments, *generated),
         units=_listed(plugin, "units"),
         devices=_listed(plugin, "devices"),
         phrases=_listed(plugin, "phrases"),
@@ -112,6 +126,7 @@ def describe(plugin: Plugin) -> PluginDescription:
     )
     problems = [
         *(problem for function in behaviours for problem in _parameter_problems(function)),
+        *mistaken,
         *_unit_problems(described.units),
     ]
     if problems:
@@ -174,11 +189,30 @@ def _marks(functions: Any, mark_of: Callable[[object], Any]) -> Iterator[Any]:
     return (mark_of(function) for function in functions)
 
 
+def _generated(
+    behaviours: Sequence[Callable[..., Any]], fragments: tuple[Any, ...]
+) -> tuple[tuple[Fragment, ...], tuple[Problem, ...]]:
+    """The fragment of the effects that are stated, and what is wrong with them. Signatures that
+    cannot be read are told elsewhere."""
+    stated: list[StatedAction] = []
+    for function in behaviours:
+        described, effect = behaviour_of(function), effect_of(function)
+        if described and effect:
+            with contextlib.suppress(WorkerFailed):
+                signature = parse_signature(described.action)
+                stated.append(StatedAction(signature, effect, _where(function, described)))
+    written = (fragment for fragment in fragments if isinstance(fragment, Fragment))
+    try:
+        return generated_fragments(stated, written), ()
+    except WorkerFailed as failed:
+        return (), failed.problems
+
+
 def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
     described = behaviour_of(function)
     if described is None:
         return
-    where = f"{_place(function)} behaviour {described.name!r}".lstrip()
+    where = _where(function, described)
     if described.when_lost not in WHEN_LOST:
         need, have = " or ".join(map(repr, WHEN_LOST)), repr(described.when_lost)
         yield Problem(
@@ -193,6 +227,10 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
     except NondumError as error:
         yield from (Problem(p.code, p.message, where=where) for p in error.problems)
         return
+    if described.name.lstrip().startswith("("):
+        message = f"its action is {described.action!r}, and its name is a signature, too"
+        fix = "give `@behaviour` one of them: a signature, or a name and `action`"
+        yield Problem("ACTION_SIGNATURE", message, where=where, fix=fix)
     expected = ["ctx", *(parameter.identifier for parameter in action.parameters)]
     found = list(_parameters(function))
     if found != expected:
@@ -203,6 +241,10 @@ def _parameter_problems(function: Callable[..., Any]) -> Iterator[Problem]:
             where=where,
             fix="give the function `ctx` and then the action's parameters, by name and in order",
         )
+
+
+def _where(function: Callable[..., Any], described: Behaviour) -> str:
+    return f"{_place(function)} behaviour {described.name!r}".lstrip()
 
 
 def _place(function: Callable[..., Any]) -> str:

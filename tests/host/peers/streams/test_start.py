@@ -23,7 +23,7 @@ from nondum.sdk.errors import LinkClosed, ProtocolViolation, WorkerFailed
 
 pytestmark = pytest.mark.anyio
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
 async def started(bridge: Bridge) -> None:

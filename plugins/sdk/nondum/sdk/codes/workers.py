@@ -5,6 +5,11 @@ from nondum.sdk.codes.code import Code
 AREA = "Plugins and workers"
 CODES = (
     Code(
+        "ACTION_EFFECT",
+        "No fragment can be made of what a behaviour says that its action makes or needs.",
+        "tell the plugin's author: `makes` and `needs` are one formula of PDDL each, (lit ?h)",
+    ),
+    Code(
         "ACTION_SIGNATURE",
         "The action of a behaviour cannot be read.",
         "tell the plugin's author: an action is written as (point ?u - pointer ?t - target)",
