@@ -301,6 +301,14 @@ _WHOLE = (
 )
 _RUNS = "tells how work of this host's own has ended"
 ASIDE: Mapping[str, str] = {
+    f"{_H}/trust/vocabulary_check.py": "remarks on a payload's words; planning judges them",
+    f"{_H}/sandbox/helper/lamps.py": "shows a state; refuses lamps that this machine lacks",
+    f"{_H}/sandbox/helper/stop_key.py": "reads one key; refuses devices that lack it",
+    f"{_H}/control/orders.py": "refuses what a person orders and what is not so here",
+    f"{_H}/control/questions.py": "refuses questions about what is not here",
+    f"{_H}/control/rows.py": "tells problems that others have found",
+    f"{_H}/workers/streams.py": "wires inputs; tells which of them is ambiguous",
+    f"{_T}/streams/broker.py": "introduces the ends of a stream to each other",
     f"{_W}/build/build.py": _BUILDS,
     f"{_W}/build/capture.py": _BUILDS,
     f"{_W}/build/resolve.py": _BUILDS,
@@ -392,11 +400,11 @@ SPARED: Mapping[tuple[str, str], str] = {
     ),
     (
         f"{_T}/fleet/zenoh_node.py",
-        "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
+        "self._peer_table.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
     (
         f"{_T}/peers/node.py",
-        "self._roster.session(peer).notify(Notice(method, args)) is Sent.FULL",
+        "self._peer_table.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
     (f"{_T}/peers/local_sockets.py", "received is None"): (
         "the socket's monitor has told of a connection before there is a link"
