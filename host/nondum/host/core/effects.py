@@ -74,7 +74,7 @@ class StagePayload(PayloadEffect):
 
 @dataclass(frozen=True, slots=True)
 class StoreWheels(PayloadEffect):
-    """Unpack each wheel that the store lacks into it, and promise it the memory that it needs."""
+    """Unpack each wheel that the store lacks into it, and reserve the memory that it needs."""
 
     beside: str = ""
     """Key of its active release, whose memory would become free for it."""

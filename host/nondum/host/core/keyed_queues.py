@@ -1,4 +1,4 @@
-"""Lanes: one piece of work at a time for each key, in the order given."""
+"""Keyed queues: one piece of work at a time for each key, in the order given."""
 
 from __future__ import annotations
 

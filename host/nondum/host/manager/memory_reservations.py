@@ -1,6 +1,6 @@
-"""What the payloads of this host were promised of its memory, so that no two count on the same.
+"""Memory that is reserved for the payloads of this host, so that no two count on the same.
 
-A payload is promised what its manifest asks for when it is let in, until nothing of it runs any
+What a payload's manifest asks for is reserved when it is let in, until nothing of it runs any
 more. What it uses by now is not free anyway; the rest is kept for it.
 """
 
@@ -19,7 +19,7 @@ NOTHING = Needs()
 
 
 class MemoryReservations:
-    """Payload key → what it was promised; `pids_of` tells which processes are a payload's."""
+    """Payload key → what is reserved for it; `pids_of` tells which processes are a payload's."""
 
     def __init__(self, pids_of: Callable[[str], Collection[int]]) -> None:
         self._pids_of = pids_of
@@ -27,11 +27,11 @@ class MemoryReservations:
         self._gpu: Gpu | None = None
 
     def make(self, payload: str, needs: Needs) -> None:
-        """Promise a payload what it needs, instead of what it was promised before."""
+        """Reserve what a payload needs, instead of what was reserved for it before."""
         self._made[payload] = needs
 
     def give_up(self, payload: str) -> None:
-        """Take back what a payload was promised, if it was promised anything."""
+        """Give up what is reserved for a payload, if anything is."""
         self._made.pop(payload, None)
 
     def saw_gpu(self, gpu: Gpu | None) -> None:

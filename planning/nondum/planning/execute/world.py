@@ -1,6 +1,6 @@
 """The world model: what the robot believes, where it has each belief from, and since when.
 
-Every voice's last word on every fact is kept (see `testimony`), and what holds is worked out from
+Every voice's last word on every fact is kept (see `provenance`), and what holds is worked out from
 all of them: the order in which news of different moments arrive changes nothing, and who goes away
 leaves exactly what never depended on them. On top lie the effects of established lasting
 behaviours, for as long as they run. There is no clock: times are passed in, in seconds.
@@ -36,7 +36,7 @@ class WorldModel:
     def __init__(self) -> None:
         self.revision = 0
         """Rises with every change."""
-        self._testimony = Provenance()
+        self._provenance = Provenance()
         self._overlays: dict[str, Overlay] = {}
         self._seeded: dict[str, frozenset[str]] = {}
         self._denied: dict[str, dict[str, None]] = {}
@@ -133,7 +133,7 @@ class WorldModel:
         if (objects, observed, functional) == (self._objects, self._observed, self._functional):
             return
         self._objects, self._observed, self._functional = objects, observed, functional
-        self._parked = {fact for fact in self._testimony if self._absent(fact)}
+        self._parked = {fact for fact in self._provenance if self._absent(fact)}
         for fact in self._functional_facts():
             self._leave_newest(fact)
         self._changed()
@@ -141,11 +141,11 @@ class WorldModel:
     def set_host_facts(self, host: str, facts: Mapping[str, str], at_s: float) -> None:
         """Replace all that the host itself asserts: fact → why, in words."""
         voice = (SourceKind.HOST, host)
-        for fact in self._testimony:
+        for fact in self._provenance:
             if fact not in facts:
                 self._drop(fact, voice)
         for fact, said in facts.items():
-            if voice not in self._testimony.of(fact):
+            if voice not in self._provenance.of(fact):
                 self._take(fact, Source(SourceKind.HOST, host, said, at_s))
 
     def seed(self, component: str, facts: Iterable[str], at_s: float) -> None:
@@ -182,7 +182,7 @@ class WorldModel:
     def recant(self, fact: str, component: str) -> None:
         """A component takes back what it said against a fact, without saying that it holds."""
         voice = (SourceKind.OBSERVATION, component)
-        word = self._testimony.of(fact).get(voice)
+        word = self._provenance.of(fact).get(voice)
         if word and word.is_against:
             self._drop(fact, voice)
 
@@ -192,8 +192,8 @@ class WorldModel:
         Its word against a fact stays: nothing comes to be believed because an observer died.
         """
         voice = (SourceKind.OBSERVATION, component)
-        for fact in self._testimony:
-            word = self._testimony.of(fact).get(voice)
+        for fact in self._provenance:
+            word = self._provenance.of(fact).get(voice)
             if word and not word.is_against:
                 self._drop(fact, voice)
         for name in [n for n, o in self._overlays.items() if o.source.who == component]:
@@ -232,7 +232,7 @@ class WorldModel:
     def withdraw_effects(self, facts: Iterable[str]) -> None:
         """Forget that finishing behaviours made facts true; who else says so is believed."""
         for fact in facts:
-            for voice, word in tuple(self._testimony.of(fact).items()):
+            for voice, word in tuple(self._provenance.of(fact).items()):
                 if word.kind is SourceKind.EFFECT and not word.is_against:
                     self._drop(fact, voice)
 
@@ -240,9 +240,9 @@ class WorldModel:
 
     def remove_component(self, component: str, objects: Collection[str]) -> None:
         """Retract all that a component says and runs, and all about its objects."""
-        for fact in self._testimony:
+        for fact in self._provenance:
             is_about = not set(parts(fact)[1]).isdisjoint(objects)
-            for voice in [v for v in self._testimony.of(fact) if is_about or v[1] == component]:
+            for voice in [v for v in self._provenance.of(fact) if is_about or v[1] == component]:
                 self._drop(fact, voice)
         self._overlays = {n: o for n, o in self._overlays.items() if o.source.who != component}
         self._seeded.pop(component, None)
@@ -252,9 +252,9 @@ class WorldModel:
     # Keeping words
 
     def _take(self, fact: str, source: Source) -> None:
-        is_new_word = (source.kind, source.who) not in self._testimony.of(fact)
-        is_plain = fact in self._testimony and fact not in self._testimony.contested
-        self._testimony.take(fact, self._numbered(source))
+        is_new_word = (source.kind, source.who) not in self._provenance.of(fact)
+        is_plain = fact in self._provenance and fact not in self._provenance.contested
+        self._provenance.take(fact, self._numbered(source))
         if is_new_word and self._absent(fact):
             self._parked.add(fact)
         if parts(fact)[0] in self._functional:
@@ -266,17 +266,17 @@ class WorldModel:
 
     def _leave_newest(self, fact: str) -> None:
         """A voice that gives a functional predicate another value takes its earlier one back."""
-        for voice, word in tuple(self._testimony.of(fact).items()):
+        for voice, word in tuple(self._provenance.of(fact).items()):
             if word.is_against or word.kind is SourceKind.FRAGMENT:
                 continue
-            for rival in tuple(self._testimony.rivals(fact)):
-                other = self._testimony.of(rival).get(voice)
+            for rival in tuple(self._provenance.rivals(fact)):
+                other = self._provenance.of(rival).get(voice)
                 if other and not other.is_against:
                     self._drop(rival if other.moment < word.moment else fact, voice)
 
     def _drop(self, fact: str, voice: Voice) -> None:
-        if self._testimony.drop(fact, voice):
-            if fact not in self._testimony:
+        if self._provenance.drop(fact, voice):
+            if fact not in self._provenance:
                 self._parked.discard(fact)
             self._changed()
 
@@ -293,8 +293,8 @@ class WorldModel:
     def _holding(self, overlays: Iterable[Overlay]) -> frozenset[str]:
         overlays = tuple(overlays)
         touched = frozenset[str]().union(*(o.add | o.delete for o in overlays))
-        facts = self._testimony.uncontested() - touched
-        doubtful = touched.union(self._testimony.contested)
+        facts = self._provenance.uncontested() - touched
+        doubtful = touched.union(self._provenance.contested)
         facts |= {fact for fact in doubtful if self._is_upheld(fact, overlays)}
         facts -= self._parked
         facts -= {fact for fact in touched if self._absent(fact)}
@@ -314,7 +314,7 @@ class WorldModel:
                 yield word
 
     def _words(self, fact: str, overlays: Iterable[Overlay] | None = None) -> list[Source]:
-        words = sorted(self._testimony.of(fact).values(), key=lambda word: word.moment)
+        words = sorted(self._provenance.of(fact).values(), key=lambda word: word.moment)
         for overlay in self._overlays.values() if overlays is None else overlays:
             words += overlay.words(fact)
         return words
@@ -328,7 +328,7 @@ class WorldModel:
 
     def _functional_facts(self) -> Iterator[str]:
         if self._functional:
-            yield from (f for f in self._testimony if f.partition(" ")[0] in self._functional)
+            yield from (f for f in self._provenance if f.partition(" ")[0] in self._functional)
 
     def _believed_rival(self, fact: str) -> str:
         if parts(fact)[0] not in self._functional or self.holds(fact):
