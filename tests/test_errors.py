@@ -22,6 +22,7 @@ FOLDERS = (
 )
 SIGNALS = {
     "Departed": "transport/nondum/transport/peers",
+    "FormulaWrong": "plugins/sdk/nondum/sdk",
     "Malformed": "wheelhouse/nondum/wheelhouse/trust",
     "Misplaced": "planning/nondum/planning",
     "OutOfPlace": "transport/nondum/transport/peers",

@@ -13,7 +13,14 @@ from tests.kit.host import HOST, LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core.events import DrivesScanned, Emit, HostStable, MountSet
+from nondum.host.core.events import (
+    DrivesScanned,
+    Emit,
+    Event,
+    HostStable,
+    MountSet,
+    PayloadActivated,
+)
 from nondum.host.core.records import ComponentState, Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.crash_attribution import STEADY_S
@@ -289,7 +296,14 @@ async def test_a_plug_is_four_commits_at_most(tmp_path: Path) -> None:
         scanned = 0
         while not any(entry.event == "DrivesScanned" for entry in await host.journal()):
             scanned = await host.catalogue.changed(scanned)
-        before = host.catalogue.commits
+        before, when_active = host.catalogue.commits, list[int]()
+
+        def note(event: Event) -> None:
+            if isinstance(event, PayloadActivated):
+                when_active.append(host.catalogue.commits)
+
+        host.bus.subscribe(note)
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        assert host.catalogue.commits - before <= 4
+        await host.until(lambda: bool(when_active))
+        assert when_active[0] - before <= 4

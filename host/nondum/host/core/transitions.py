@@ -82,6 +82,7 @@ HELD: frozenset[type[Event]] = frozenset(
         events.PayloadVerified,
         events.PayloadStaged,
         events.ComponentsProbed,
+        events.DriveReleased,
     }
 )
 """Progress that is not committed by itself: recovery does the same before it and after it. The next

@@ -168,22 +168,26 @@ class ComponentManager:
         """Events that waited together share one commit."""
         self._unscanned -= {event.kind for event, _ in batch if isinstance(event, DrivesScanned)}
         outcome, told = _advance_all(self._catalogue.state, batch)
-        await self._commit(outcome.state, told)
+        may_wait = all(type(event) in HELD for event, _ in (*batch, *told))
+        await self._commit(outcome.state, told, may_wait=may_wait and bool(batch))
         self._executor.adopt(outcome.state)
         early = {id(event) for event, _ in batch if self._bus.is_told_early(event)}
         self._bus.tell([event for event in outcome.events if id(event) not in early])
         for effect in outcome.effects:
             self._executor.start(effect)
 
-    async def _commit(self, after: HostState, told: Sequence[Stamped]) -> None:
+    async def _commit(
+        self, after: HostState, told: Sequence[Stamped], *, may_wait: bool = False
+    ) -> None:
         """Write a state down. Where that cannot be done, go on with it all the same: what was
-        pulled must go, whatever the disk does. What is owed is written as soon as it can be."""
+        pulled must go, whatever the disk does. What is owed is written as soon as it can be; what
+        `may_wait`, with the next state."""
         catalogue = self._catalogue
         before, loss, unwritten = catalogue.state, catalogue.loss, catalogue.unwritten
         if after is before and not told and unwritten is None:
             return
         entries = list(entries_of(told, before, after, catalogue.boot))
-        if unwritten is None and told and all(type(event) in HELD for event, _ in told):
+        if may_wait and unwritten is None:
             catalogue.hold(after, entries)
             return
         tries_left = COMMIT_TRIES if unwritten is None else 0
