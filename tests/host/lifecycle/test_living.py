@@ -293,9 +293,7 @@ async def test_a_plug_is_four_commits_at_most(tmp_path: Path) -> None:
     """Inserted, found, stored, active: what recovery tells apart."""
     lamp(tmp_path / "drive")
     async with host_in_process(tmp_path) as host:
-        scanned = 0
-        while not any(entry.event == "DrivesScanned" for entry in await host.journal()):
-            scanned = await host.catalogue.changed(scanned)
+        await host.until(lambda: host.catalogue.commits == 2)  # it has started, and has scanned
         before, when_active = host.catalogue.commits, list[int]()
 
         def note(event: Event) -> None:
