@@ -20,6 +20,15 @@ def is_alive(pid: int) -> bool:
     return status.rpartition(")")[2].split()[0] not in {"Z", "X"}
 
 
+def children() -> frozenset[int]:
+    """The processes that this one started and has not reaped."""
+    told: set[int] = set()
+    for task in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):  # a thread that ends: its children are another's then
+            told.update(map(int, (task / "children").read_text(encoding="ascii").split()))
+    return frozenset(told)
+
+
 @contextlib.contextmanager
 def process_ended(pid: int) -> Iterator[asyncio.Event]:
     """Set when a process ends (pidfd_open(2))."""

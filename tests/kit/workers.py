@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pluggy
-from tests.kit.until import PATIENCE_S, arrived
+from tests.kit.clock import VirtualClock
+from tests.kit.processes import children
+from tests.kit.until import PATIENCE_S, arrived, until_async
 
 from nondum.host.config.confinement_level import ConfinementState, parse_wanted
 from nondum.host.core.events import BehaviourEnded, Event, WorkerExited, WorkerReady
@@ -58,6 +60,8 @@ class WorkersUnderTest:
     confinement: Confinement | None = None
     """What holds the workers; the machine's best, if not given."""
     events: list[Event] = field(default_factory=list)
+    _others: frozenset[int] = field(default_factory=children)
+    """Processes that were there before."""
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
@@ -156,6 +160,17 @@ class WorkersUnderTest:
                     if inner == told:
                         return int(entry.name)
         raise LookupError(f"{component} has no process {told}")
+
+    async def close(self, clock: VirtualClock) -> None:
+        """End all workers in virtual time; wait in real time until they are reaped: what a killed
+        process is given may pass before the kernel has ended it."""
+        await clock.advance_until(self.workers.close())
+        await until_async(
+            "ends of workers", lambda: not children() - self._others, evidence=self._left
+        )
+
+    def _left(self) -> str:
+        return f"left: {sorted(children() - self._others)}"
 
     async def until_exited(self, times: int) -> None:
         """Wait until `times` workers have ended that were not to end."""

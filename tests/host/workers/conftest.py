@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
-from tests.kit.processes import until_gone
 from tests.kit.workers import WorkersUnderTest
 
 
@@ -16,7 +15,4 @@ async def tested(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUn
     """Workers that are judged in virtual time, ended after the test."""
     made = WorkersUnderTest(tmp_path)
     yield made
-    pids = made.workers.pids().values()
-    await clock.advance_until(made.workers.close())
-    for pid in pids:  # virtual time may have passed before the kernel had ended it
-        await until_gone(pid)
+    await made.close(clock)

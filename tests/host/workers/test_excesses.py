@@ -38,7 +38,7 @@ async def in_cgroup(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[Worker
     assert await done(tested, "other") is RunState.SUCCEEDED
     assert tested.workers.pids()["other"] == pid
     assert is_alive(pid)
-    await clock.advance_until(tested.workers.close())
+    await tested.close(clock)
     assert cgroups.sweep() == 0, "cgroups are left"
     cgroups.close()
 

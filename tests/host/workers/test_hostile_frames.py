@@ -147,7 +147,7 @@ async def other(tmp_path: Path, clock: VirtualClock) -> AsyncIterator[WorkersUnd
     yield tested
     assert await do(tested, "good").ended() is RunState.SUCCEEDED
     assert len(tested.told(WorkerReady)) == 1
-    await clock.advance_until(tested.workers.close())
+    await tested.close(clock)
 
 
 async def meet(tested: WorkersUnderTest, name: str, script: str, *, hangs: bool = False) -> str:
