@@ -17,7 +17,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FILE = Path(__file__).with_suffix(".toml")
-TEXT = (".py", ".md", ".toml", ".json", ".sql", ".service", ".pddl", ".sh", ".cfg", ".ini", ".conf")
+TEXT = (
+    *(
+        ".py",
+        ".md",
+        ".toml",
+        ".json",
+        ".sql",
+        ".pddl",
+        ".sh",
+        ".cfg",
+        ".ini",
+        ".conf",
+        ".rules",
+        ".1",
+    ),
+    *(".service", ".socket", "postinst", "postrm", "preinst", "prerm"),
+)
 
 
 @dataclass(frozen=True, slots=True)

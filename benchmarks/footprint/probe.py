@@ -99,7 +99,7 @@ def _kind(pid: int) -> str:
         return "other"
     program = Path(words[0]).name
     if program == "bwrap":
-        return "keeper"
+        return "init"
     said = " ".join(words)
     return next((kind for part, kind in KINDS.items() if part in said), "other")
 

@@ -13,7 +13,7 @@ Shown = Callable[[Footprint], str]
 ROWS: Sequence[tuple[str, str, Shown]] = (
     ("memory of the idle daemon", "≤ 60 MB", lambda f: f"{f.daemon_mb:.1f} MB"),
     ("a worker, its plugin importing nothing", "≤ 20 MB", lambda f: f"{f.worker_mb:.1f} MB"),
-    ("a worker's init (process 1 of its sandbox)", "", lambda f: f"{f.mb_of('keeper'):.1f} MB"),
+    ("a worker's init (process 1 of its sandbox)", "", lambda f: f"{f.mb_of('init'):.1f} MB"),
     ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),
     ("planners, all of them", "", lambda f: f"{f.mb_of('planner'):.1f} MB"),
     ("a child for drives, waiting", "", lambda f: f"{f.mb_of('drive child'):.1f} MB"),

@@ -143,7 +143,7 @@ def _shown(default: Any) -> str:
     """A default as the file would say it."""
     match default:
         case None:
-            return "from the machine's"
+            return "none"
         case _:
             return f"`{as_toml(default)}`"
 

@@ -9,6 +9,7 @@ from tests.docs.codes import NO_CODES, PUT_TOGETHER, TABLE, all_told, mentioned
 from tests.docs.reference import DOCS, MARK
 
 from nondum.sdk import codes
+from nondum.sdk.codes.former import FORMER
 from nondum.sdk.errors import Problem
 
 HOW = f"""
@@ -34,6 +35,11 @@ def test_every_code_that_is_declared_is_told() -> None:
     told = {found.code for found in all_told()} | mentioned().keys() | PUT_TOGETHER
     unused = codes.every().keys() - told
     assert not unused, f"nothing tells these any more: take them out of {TABLE}/: {unused}"
+
+
+def test_every_former_name_leads_to_a_code() -> None:
+    lost = {former: name for former, name in FORMER.items() if name not in codes.every()}
+    assert not lost, "`nondum explain` finds nothing for these"
 
 
 def test_every_code_is_declared_once() -> None:

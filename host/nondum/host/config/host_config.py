@@ -36,7 +36,8 @@ class HostSection:
     """Who this host is, and where it keeps what it knows."""
 
     name: str = field(default_factory=lambda: default_name(socket.gethostname()))
-    """Name of the host, and of its body's frame: lower-case letters, digits and single hyphens."""
+    """Name of the host, and of its body's frame: lower-case letters, digits and single hyphens.
+    Without one it is made of the machine's."""
     state: Path = Path("/var/lib/nondum")
     """Folder of catalogue, store and venvs."""
     control: Path = Path("/run/nondum/control.sock")

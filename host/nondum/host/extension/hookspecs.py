@@ -76,4 +76,5 @@ def feedback_outputs(host: Host) -> Iterable[Output]:  # type: ignore[empty-body
 
 @hookspec
 def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a specification
-    """Functions that are told every event, on the loop, after it was committed."""
+    """Functions that are told every event, on the loop: one that changes the catalogue after that was
+    committed, or, for progress within a plug, held for the next commit."""

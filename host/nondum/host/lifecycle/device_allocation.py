@@ -1,7 +1,7 @@
 """Which device serves which declared need of which component.
 
 The rule: a need is given all nodes of a device that match it, or none. A device stays with the
-component that has it; a free one goes to the first component, by id, that needs it, and of several
+component that has it; a free one goes to the first component, by name, that needs it, and of several
 that serve a need the first by port is given. Several components may have parts of one device, as
 long as no node is wanted twice. The host tells people which other components want a device. It does
 not touch a device that no component needs.

@@ -31,15 +31,14 @@ from nondum.host.core.events import (
     WheelsStored,
 )
 from nondum.host.core.keyed_queues import in_thread
-from nondum.host.core.records import ComponentRecord, Moment
+from nondum.host.core.records import Moment
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import STALL_S, Children
-from nondum.host.jobs.prepared import Prepared
 from nondum.host.jobs.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.retry_causes import Amounts
 from nondum.host.manager.drive_reading import LOOK_S, stalls_as_drive_gone
-from nondum.host.manager.headroom import Needs
+from nondum.host.manager.installed_payload import InstalledPayload
 from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
 from nondum.host.manager.state_folders import Folders, missing, remove, sweep
@@ -49,8 +48,6 @@ from nondum.host.workers.spec import Limits, base_interpreter
 from nondum.host.workers.workers import Workers
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
-from nondum.wheelhouse.format.signatures import Grant
-from nondum.wheelhouse.payload.gpu import Gpu
 from nondum.wheelhouse.payload.memory import Memory, Promised, free_memory_mb
 from nondum.wheelhouse.store import disk
 
@@ -104,19 +101,14 @@ class Installation:
     ) -> None:
         self._host, self._folders, self._options = host, folders, options
         self._trust = trust
-        self._grants: dict[str, Grant] = {}
-        self._goals: dict[str, tuple[str, ...]] = {}
         self._workers, self._children, self._emit = workers, children, emit
-        self._prepared: dict[str, tuple[Prepared, ...]] = {}
-        self._needs: dict[str, Needs] = {}
+        self._installed: dict[str, InstalledPayload] = {}
         self._reservations = MemoryReservations(workers.pids_of)
         self._queue = Queue(AT_ONCE)
         self._drives: dict[str, str] = {}
         """Payload → the drive that it was copied from: the owner of the children that read it."""
         self._store = asyncio.Lock()
         """One process writes to the store."""
-        self._uncompiled: set[str] = set()
-        """Payloads whose workers would be started sooner if their modules were compiled."""
 
     async def rebuild(self, state: HostState, at: Moment) -> HostState:
         """The state, with what is installed for good and is not in it."""
@@ -177,28 +169,29 @@ class Installation:
 
     async def store(self, effect: effects.StoreWheels) -> tuple[Event, ...]:
         """Fill the store and make the venvs."""
-        fresh = await self._install(effect.payload, effect.renamed, admit_beside=effect.beside)
-        return (WheelsStored(effect.payload, fresh),)
+        made = await self._install(effect.payload, effect.renamed, admit_beside=effect.beside)
+        return (WheelsStored(effect.payload, made.fresh),)
 
     async def probe(self, effect: effects.ProbeComponents) -> tuple[Event, ...]:
         """Start all workers, or none. Raises `WorkerFailed` with what every one did wrong."""
         key = effect.payload
-        if key not in self._prepared:  # a restart of the daemon, or another try
-            await self._install(key, effect.renamed)
-        self._reservations.make(key, self._needs[key])
+        installed = self._installed.get(key)
+        if installed is None:  # a restart of the daemon, or another try
+            installed = await self._install(key, effect.renamed)
+        self._reservations.make(key, installed.needs)
         if effect.beside and (
             reason := await self._reservations.why_not_beside(key, effect.beside)
         ):
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
-        specs = [component.spec(key, self._options.limits) for component in self._prepared[key]]
         role = Role.BESIDE if effect.beside else Role.ACTIVE
+        specs = installed.specs(self._options.limits)
         started = await asyncio.gather(
             *(self._workers.start(spec, role) for spec in specs), return_exceptions=True
         )
         failed = [error for error in started if isinstance(error, BaseException)]
         if failed:
-            await self._stop(key, tuple(component.id for component in self._prepared[key]))
+            await self._stop(key, installed.ids)
             known = [error for error in failed if isinstance(error, NondumError)]
             if len(known) < len(failed):
                 raise next(error for error in failed if not isinstance(error, NondumError))
@@ -207,38 +200,31 @@ class Installation:
 
     async def activate(self, effect: effects.ActivatePayload) -> tuple[Event, ...]:
         """Make the records that the catalogue takes in at once."""
-        prepared = self._prepared[effect.payload]
+        key = effect.payload
+        installed = self._installed[key]
         if effect.beside:
-            await asyncio.gather(
-                *(self._workers.watched(component.id, effect.payload) for component in prepared)
-            )
-        self._queue.leave(effect.payload)
-        return (
-            PayloadActivated(
-                effect.payload,
-                tuple(self._record(component, effect.payload) for component in prepared),
-                tuple(pose for component in prepared for pose in component.poses(self._host)),
-                self._grants[effect.payload],
-                self._goals[effect.payload],
-            ),
+            await asyncio.gather(*(self._workers.watched(id, key) for id in installed.ids))
+        self._queue.leave(key)
+        records = tuple(  # with what has gone wrong since they were started
+            replace(record, problems=self._workers.dead_conditions(record.id, key))
+            for record in installed.records()
         )
-
-    def _record(self, component: Prepared, payload: str) -> ComponentRecord:
-        """A component as the catalogue takes it in, with what has gone wrong since its start."""
-        problems = self._workers.dead_conditions(component.id, payload)
-        return replace(component.record(payload), problems=problems)
+        poses = installed.poses(self._host)
+        return (PayloadActivated(key, records, poses, installed.grant, installed.goals),)
 
     async def compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
         """Byte-compile in the store what it runs, and link that into its venvs.
 
         What pip installed is left as it is.
         """
-        if effect.payload in self._uncompiled:
-            arguments = self._arguments(**self._places(effect.payload))
+        key = effect.payload
+        installed = self._installed.get(key)
+        if installed is not None and not installed.is_compiled:
             async with self._store:
-                await self._children.run_aside("compile", arguments)
-            self._uncompiled.discard(effect.payload)
-        return (WheelsCompiled(effect.payload),)
+                await self._children.run_aside("compile", self._arguments(**self._places(key)))
+            if (still := self._installed.get(key)) is not None:  # it may be deleted meanwhile
+                self._installed[key] = replace(still, is_compiled=True)
+        return (WheelsCompiled(key),)
 
     async def rest(self, effect: effects.RestPayload) -> tuple[Event, ...]:
         """Keep all of a payload but its processes."""
@@ -294,8 +280,8 @@ class Installation:
 
     async def _install(
         self, key: str, renamed: Mapping[str, str], *, admit_beside: str | None = None
-    ) -> int:
-        """Run the job `install`; says how many wheels the store did not have.
+    ) -> InstalledPayload:
+        """Run the job `install`.
 
         A payload that is to be let in, beside a release or "", is refused if its memory is
         promised to others. It is promised some before the next one asks.
@@ -306,18 +292,12 @@ class Installation:
             if admit_beside is not None:
                 headroom = await self._reservations.headroom(key, admit_beside)
             told = await self._run("install", key, {**arguments, "headroom": headroom})
-            self._needs[key] = Needs.parse(told["needs"])
-            self._reservations.make(key, self._needs[key])
-            self._reservations.saw_gpu(Gpu(**told["gpu"]) if told["gpu"] else None)
-        if told["uncompiled"]:
-            self._uncompiled.add(key)
-        named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
-        self._prepared[key] = tuple(
-            Prepared.parse(said, name, self._folders.scratch(key, name)) for said, name in named
-        )
-        self._grants[key] = Grant.parse(told["grant"])
-        self._goals[key] = tuple(told["goals"])
-        return int(told["fresh"])
+            scratch = partial(self._folders.scratch, key)
+            installed = InstalledPayload.parse(key, told, renamed, scratch)
+            self._reservations.make(key, installed.needs)
+            self._reservations.saw_gpu(installed.gpu)
+        self._installed[key] = installed
+        return installed
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
         self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))
@@ -341,12 +321,8 @@ class Installation:
     ) -> None:
         self._queue.leave(effect.payload)
         await self._children.release(self._drives.pop(effect.payload, effect.payload))
-        self._prepared.pop(effect.payload, None)
-        self._needs.pop(effect.payload, None)
+        self._installed.pop(effect.payload, None)
         self._reservations.give_up(effect.payload)
-        self._grants.pop(effect.payload, None)
-        self._goals.pop(effect.payload, None)
-        self._uncompiled.discard(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)
         await in_thread(end_leftovers, scratches)
         await in_thread(_remove_all, (*folders, scratches))

@@ -128,7 +128,7 @@ class Context:
 
     @property
     def component(self) -> str:
-        """The component's id."""
+        """The component's name on this host."""
         return self._workplace.place.component
 
     @property

@@ -1,0 +1,75 @@
+"""A payload whose venvs are made, as the daemon keeps it while the payload is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nondum.host.core.records import ComponentRecord, MountPose
+from nondum.host.jobs.prepared import Prepared
+from nondum.host.manager.headroom import Needs
+from nondum.host.workers.spec import Limits, WorkerSpec
+from nondum.wheelhouse.format.signatures import Grant
+from nondum.wheelhouse.payload.gpu import Gpu
+
+
+@dataclass(frozen=True, slots=True)
+class InstalledPayload:
+    """What its workers are started from, what it needs, and what it may have."""
+
+    key: str
+    components: tuple[Prepared, ...]
+    needs: Needs
+    grant: Grant
+    goals: tuple[str, ...]
+    """The goals that it brings, as written."""
+    gpu: Gpu | None
+    """The graphics processor that the host was found to have, if any."""
+    fresh: int
+    """Wheels that the store did not have."""
+    is_compiled: bool
+    """Whether its workers would start no sooner if its modules were compiled once more."""
+
+    @classmethod
+    def parse(
+        cls,
+        key: str,
+        told: Mapping[str, Any],
+        renamed: Mapping[str, str],
+        scratch: Callable[[str], Path],
+    ) -> InstalledPayload:
+        """Read what the job `install` told. It comes from our own child and is trusted.
+
+        `renamed` has the names on this host of components that have another one in the payload;
+        `scratch` gives the scratch folder of a component.
+        """
+        named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
+        return cls(
+            key,
+            tuple(Prepared.parse(said, name, scratch(name)) for said, name in named),
+            Needs.parse(told["needs"]),
+            Grant.parse(told["grant"]),
+            tuple(told["goals"]),
+            Gpu(**told["gpu"]) if told["gpu"] else None,
+            told["fresh"],
+            not told["uncompiled"],
+        )
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Its components, by their names on this host."""
+        return tuple(component.id for component in self.components)
+
+    def specs(self, limits: Limits) -> tuple[WorkerSpec, ...]:
+        """What its workers are started from."""
+        return tuple(component.spec(self.key, limits) for component in self.components)
+
+    def records(self) -> tuple[ComponentRecord, ...]:
+        """What the catalogue keeps of its components."""
+        return tuple(component.record(self.key) for component in self.components)
+
+    def poses(self, host: str) -> tuple[MountPose, ...]:
+        """Where its units sit, as its manifest says."""
+        return tuple(pose for component in self.components for pose in component.poses(host))
