@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from tests.kit.clock import VirtualClock
 
-pytest_plugins = ["tests.kit.evidence", "tests.runner.plugin"]
+pytest_plugins = ["tests.kit.evidence", "tests.kit.golden", "tests.runner.plugin"]
 
 _QUIET = [HealthCheck.too_slow]
 """How fast examples are made says something of the machine, nothing of nondum."""

@@ -24,6 +24,7 @@ SIGNALS = {
     "Departed": "transport/nondum/transport/peers",
     "FormulaWrong": "plugins/sdk/nondum/sdk",
     "Malformed": "wheelhouse/nondum/wheelhouse/trust",
+    "Mismatch": "plugins/sdk/nondum/sdk",
     "Misplaced": "planning/nondum/planning",
     "OutOfPlace": "transport/nondum/transport/peers",
     "PatternInvalid": "planning/nondum/planning",

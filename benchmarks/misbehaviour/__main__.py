@@ -16,7 +16,10 @@ from benchmarks.misbehaviour.ways import WAYS, Way
 from benchmarks.misbehaviour.windows import Window, p99, window
 
 from nondum.host.service import malloc
-from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
+from nondum.host.workers.unconfined import Unconfined
 
 PAGE = Path(__file__).parents[2] / "docs/reliability/workers.md"
 REPEATS = 4

@@ -15,9 +15,10 @@ from pathlib import Path
 import pluggy
 from benchmarks.misbehaviour.windows import Call, Frame
 
-from nondum.host.core.events import Event, WorkerExited, WorkerLogged, WorkerStrained
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.workers import WorkerExited, WorkerLogged, WorkerStrained
 from nondum.host.sandbox.cgroups import Cgroups
-from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.confinement import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
 from nondum.host.workers.workers import Workers

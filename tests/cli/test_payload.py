@@ -133,7 +133,7 @@ def test_version_that_goes_down_is_remarked_on(tmp_path: Path) -> None:
     assert "warning" not in nondum(*words).ok().out
     said = source / "wheel.json"
     said.write_text(said.read_text().replace('"1.0"', '"0.9"'))
-    assert "warning: this is version 0.9, 1.0 was here" in nondum(*words).ok().out
+    assert re.search(r"warning: .*\b0\.9\b.*\b1\.0\b", nondum(*words).ok().out)
 
 
 def test_a_package_that_is_none_cannot_be_built(tmp_path: Path) -> None:

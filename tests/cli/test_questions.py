@@ -12,6 +12,7 @@ import pytest
 from tests.cli.conftest import Answering
 from tests.kit.beacon import BEACON_ID, BRIGHTNESS, LAMP
 from tests.kit.command_line import nondum
+from tests.kit.golden import Golden
 from tests.kit.running_host import RunningHost
 from tests.kit.until import until as until_seen
 
@@ -239,9 +240,9 @@ def test_the_journal_tells_a_payload_step_by_step(daemon: RunningHost) -> None:
     assert rows(daemon, "journal", "--subject", BEACON_ID, "--limit", "2") == found[-2:]
 
 
-def test_the_journal_is_silent_of_strangers(daemon: RunningHost) -> None:
+def test_the_journal_is_silent_of_strangers(daemon: RunningHost, golden: Golden) -> None:
     shown = daemon.run("journal", "--subject", "stranger").ok().out
-    assert shown == "the journal says nothing of it\n"
+    golden.check("the journal knows nothing", shown)
 
 
 def test_logs_are_lines_with_time_component_and_level(daemon: RunningHost) -> None:
@@ -291,21 +292,21 @@ def test_names_are_short_for_people_and_whole_in_json(daemon: RunningHost) -> No
     assert rows(daemon, "streams")[0]["stream"] == BRIGHTNESS
 
 
-def test_a_wrong_fact_gets_the_nearest_words(daemon: RunningHost) -> None:
-    assert "did you mean 'flowing'?" in daemon.run("facts", "--why", "flowin x").ok().out
-    assert "did you mean 'panther'?" in daemon.run("facts", "--why", "(lit panter)").ok().out
+def test_a_wrong_fact_gets_the_nearest_words(daemon: RunningHost, golden: Golden) -> None:
+    assert "'flowing'" in daemon.run("facts", "--why", "flowin x").ok().out
+    assert "'panther'" in daemon.run("facts", "--why", "(lit panter)").ok().out
     arity = daemon.run("facts", "--why", "lit", "--json").ok().json
-    assert arity["hint"] == "'lit' takes 1 arguments, not 0"
+    golden.check("too few arguments", arity["hint"])
 
 
-def test_nothing_is_parked(daemon: RunningHost) -> None:
-    assert daemon.run("facts", "--parked").ok().out == "nothing waits for an object\n"
+def test_nothing_is_parked(daemon: RunningHost, golden: Golden) -> None:
+    golden.check("nothing is parked", daemon.run("facts", "--parked").ok().out)
     daemon.run("facts", "--parked", "--why", "lit").refused(2, "choose one")
 
 
 def test_a_stream_that_is_none_is_refused_with_the_nearest(daemon: RunningHost) -> None:
     ran = daemon.run("streams", "--follow", "panther__beacon__brightnes")
-    ran.refused(1, "STREAM_UNKNOWN").refused(1, f"did you mean '{BRIGHTNESS}'?")
+    ran.refused(1, "STREAM_UNKNOWN").refused(1, f"'{BRIGHTNESS}'")
 
 
 @pytest.mark.parametrize(
@@ -338,6 +339,6 @@ def test_a_row_of_goals_tells_the_first_cause_alone_and_json_all(
         assert ran.json == view
         return
     shown = nondum("--control", answering(*answers), "goals").ok().out
-    assert f"cannot: {WAITS}; 2 more, see `nondum why aim`" in shown
+    assert WAITS in shown and "`nondum why aim`" in shown
     assert "it moved" in shown and "at 3° → 4°" in shown
     assert not any(left in shown for left in (*LACKS[1:], "→ wait", "AIM_SEEN"))

@@ -13,7 +13,8 @@ from pathlib import Path
 import pyudev
 
 from nondum.host.app import run_host
-from nondum.host.config.host_config import load, user_config
+from nondum.host.config.host_config import user_config
+from nondum.host.config.parsing import load
 from nondum.host.sources.drives.blocks import BlockSource
 
 

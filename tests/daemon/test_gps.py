@@ -48,7 +48,8 @@ def test_robot_knows_and_tells_where_it_is_while_there_is_a_fix(
     slots.plug(host.devices, "mouse", receiver.node, U_BLOX)
     receiver.says(line.NO_FIX)
     goal = host.want("(position-told spot)", kind="do")
-    assert "position of gps has not told it" in host.until_goal(goal, "suspended")["reason"]
+    needs = host.until_goal(goal, "suspended")["needs"]
+    assert [need["code"] for need in needs] == ["WHY_NOT_TOLD"]
     receiver.says(line.gsa(3), line.gga())
     assert host.until_goal(goal, "reached")["reason"] == ANSWER
     again = host.want("(position-told spot)", kind="do")

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from tests.kit.golden import Golden
 from tests.kit.payloads import Part
 from tests.kit.running_host import RunningHost
 
@@ -80,13 +81,15 @@ def test_odometry_of_the_base_is_waited_for_and_not_taken_from_a_gps(host: Runni
     assert "a pose of a base" in host.run("streams").out
 
 
-def test_person_decides_what_an_input_gets_and_that_is_kept(own_host: RunningHost) -> None:
+def test_person_decides_what_an_input_gets_and_that_is_kept(
+    own_host: RunningHost, golden: Golden
+) -> None:
     host = own_host
     drives = [host.bring("a-gps", GPS), host.bring("base", BASE), host.bring("eye", EYE)]
     until_fed(host, INPUT, ODOMETRY)
     short = FIX.rpartition("__")[2]  # as the table of streams shows it
     told = host.run("streams", "--connect", INPUT, short).ok().out
-    assert told == f"{INPUT} gets {short} from now on, and nothing else\n"
+    golden.check("a person connects a stream", told, input=INPUT, stream=short)
     until_fed(host, INPUT, FIX)
     host.stop()
     host.start()

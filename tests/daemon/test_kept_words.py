@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.daemon.neighbours import BEACON, UNCONFINED, listener, say
+from tests.kit.golden import Golden
 from tests.kit.payloads import Part
 from tests.kit.running_host import READY_S, RunningHost, running
 
@@ -60,18 +61,19 @@ def state(host: RunningHost, id: str) -> str:
     return str(row["state"])
 
 
-def test_words_said_too_early_are_refused_with_the_reason_and_the_way(slow: Slow) -> None:
+def test_words_said_too_early_are_refused_with_the_reason_and_the_way(
+    slow: Slow, golden: Golden
+) -> None:
     refused = slow.host.run("goal", "blink")
     refused.refused(1, "PHRASE_EARLY")
-    assert "1 payload is still being installed" in refused.err
-    assert "--keep" in refused.err
+    golden.check_line("words are typed too early", refused.err)
     assert not slow.host.ask("goals")["given"]
 
 
-def test_words_that_are_kept_are_given_once_they_mean_something(slow: Slow) -> None:
+def test_words_that_are_kept_are_given_once_they_mean_something(slow: Slow, golden: Golden) -> None:
     kept = slow.host.run("goal", "blink", "--keep", "--priority", "3", "--json").ok().json
     assert (kept["state"], kept["text"], kept["goal"]) == ("kept", "blink", "")
-    assert kept["reason"] == "1 payload is still being installed"
+    golden.check("words are kept", kept["reason"])
     slow.let()
     reached = slow.host.until_goal(kept["id"], "reached")
     assert (reached["goal"], reached["priority"]) == ("(seen spot)", 3)
@@ -104,10 +106,10 @@ def test_words_are_given_up_when_what_they_wait_for_does_not_come(slow: Slow) ->
     assert (waiting.returncode, row["state"]) == (1, "halted")
 
 
-def test_words_spoken_too_early_are_kept_while_payloads_come_in(slow: Slow) -> None:
+def test_words_spoken_too_early_are_kept_while_payloads_come_in(slow: Slow, golden: Golden) -> None:
     slow.says("blink")
     told = slow.host.until_told("'blink': that is kept as goal ")
-    assert "1 payload is still being installed" in told
+    golden.check("words are spoken too early", told)
     slow.let()
     slow.host.until_goal("1", "reached")
     slow.says("dance")

@@ -17,6 +17,7 @@ from demo.robot import nondum
 from tests.daemon.neighbours import UNCONFINED, beacon, until_peer, until_shared, written
 from tests.daemon.plugins import talker
 from tests.kit.disk_images import image
+from tests.kit.golden import Golden
 from tests.kit.loop_devices import attached, detach
 from tests.kit.payloads import Part
 from tests.kit.running_host import DAEMON, RunningHost
@@ -164,14 +165,14 @@ def test_host_that_was_out_of_reach_is_asked_again(tmp_path: Path) -> None:
         assert len(list((mule.state / "placed").iterdir())) == 1
 
 
-def test_rules_of_the_other_host_hold_there(tmp_path: Path) -> None:
+def test_rules_of_the_other_host_hold_there(tmp_path: Path, golden: Golden) -> None:
     with hosts(tmp_path, "rover", "mule", programs=ROVER_IS_OTHER, unsigned=["rover"]) as made:
         rover, mule = made
         rover.plug(rover.drive("light", beacon(tmp_path / "log")))
         told = rover.until_told("no host takes org.example.light")
-        assert "mule: the payload is not signed" in told
+        golden.check("the other host does not take it", told)
         row = placed(rover, "light")
-        assert row["state"] == "no host takes it"
+        golden.check("state: no host takes it", row["state"])
         assert list(row["declined"]) == ["mule"]
         assert not mule.view["payloads"]
         assert not list((mule.state / "placed").iterdir())
@@ -190,12 +191,12 @@ def test_host_that_takes_nothing_is_not_asked(tmp_path: Path) -> None:
         assert refused.value.code == "PLACE_OFF"
 
 
-def test_person_says_where_a_payload_runs(tmp_path: Path) -> None:
+def test_person_says_where_a_payload_runs(tmp_path: Path, golden: Golden) -> None:
     with hosts(tmp_path, "rover", "mule") as (rover, mule):
         slot = rover.plug(rover.drive("light", beacon(tmp_path / "log")))
         rover.until_step("light", "active")
         said = nondum("--control", rover.control, "place", "org.example.light", "mule")
-        assert said == "org.example.light is to run on mule: see `nondum place`\n"
+        golden.check("a person places a payload", said)
         until_shared(rover, "beacon@mule")
         row = rover.until_step("light", "refused")
         assert row["codes"] == ["PLACED_ELSEWHERE"]
@@ -204,7 +205,8 @@ def test_person_says_where_a_payload_runs(tmp_path: Path) -> None:
         mule.until_gone("light")
         rover.until_gone("light")
         (row,) = rover.ask("places")
-        assert (row["state"], row["pinned"]) == ("not plugged in", "mule")
+        assert row["pinned"] == "mule"
+        golden.check("state: not plugged in", row["state"])
         rover.stop()
         rover.start()
         rover.plug(rover.work / "drives" / "light")

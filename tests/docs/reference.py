@@ -21,7 +21,7 @@ from tests.docs.dataclass_fields import field_docs
 
 from nondum.cli import explain
 from nondum.cli.main import cli
-from nondum.host.config import host_config
+from nondum.host.config import host_config, parsing
 from nondum.host.config import reference as keys_of
 from nondum.host.config.effective import as_toml
 from nondum.host.extension import hookspecs
@@ -81,7 +81,7 @@ def configuration_keys() -> str:
         name, shown = f"{section}.{key}", as_toml(default)
         told[name] = {
             "meaning": field_docs(type(getattr(host_config.HostConfig(), section)))[key],
-            "kind": host_config.KINDS[hints[section][key]],
+            "kind": parsing.KINDS[hints[section][key]],
             "unit": keys_of.unit_of(key),
             "default": shown,
             "example": keys_of.EXAMPLES.get(name, shown),

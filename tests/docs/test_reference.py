@@ -15,7 +15,7 @@ from tests.docs.reference import DOCS, DOCUMENTS, KEYS, MARK, all_commands, conf
 from tests.docs.sdk_reference import core_words, message_classes
 
 from nondum.cli.main import cli
-from nondum.host.config import host_config, reference
+from nondum.host.config import host_config, parsing, reference
 from nondum.planning.merge.core import core
 from nondum.sdk import hooks
 
@@ -59,9 +59,7 @@ def test_every_example_of_a_key_is_taken() -> None:
     for name, told in reference.keys().items():
         section, _, key = name.partition(".")
         assert told["example"], name
-        host_config.parse(
-            f"[{section}]\n{key} = {told['example']}\n", name, host_config.HostConfig()
-        )
+        parsing.parse(f"[{section}]\n{key} = {told['example']}\n", name, host_config.HostConfig())
 
 
 def test_every_hook_is_documented() -> None:

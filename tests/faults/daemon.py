@@ -30,9 +30,16 @@ from typing import Any
 from tests.faults import kept
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core import events
 from nondum.host.core.bus import Bus
-from nondum.host.core.records import DriveState, JournalEntry, Step
+from nondum.host.core.events.drives import DriveRemoved
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.releases import RollbackAsked
+from nondum.host.core.events.trust import PayloadDistrusted
+from nondum.host.core.events.workers import WorkerExited, WorkerFailed, WorkerReady
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 from nondum.host.jobs.children import watched_without_threads
@@ -169,22 +176,22 @@ class DeadlyCatalogue(Catalogue):
                     self.tell(line)
             case "pull":
                 (root / "slots" / SLOT).unlink()
-                self.bus.emit(events.DriveRemoved(SLOT))
+                self.bus.emit(DriveRemoved(SLOT))
             case "send":
-                self.bus.emit(events.PayloadSentAway(key, "mule", (problem,)))
+                self.bus.emit(PayloadSentAway(key, "mule", (problem,)))
             case "distrust":
-                self.bus.emit(events.PayloadDistrusted(key, (problem,)))
+                self.bus.emit(PayloadDistrusted(key, (problem,)))
             case "retry":
-                self.bus.emit(events.RetryAsked(key))
+                self.bus.emit(RetryAsked(key))
             case "rollback":
-                self.bus.emit(events.RollbackAsked(key, 1, 2))
+                self.bus.emit(RollbackAsked(key, 1, 2))
             case "lost":
-                self.bus.emit(events.WorkerFailed(COMPONENT, lost))
+                self.bus.emit(WorkerFailed(COMPONENT, lost))
             case "exited":
-                self.bus.emit(events.WorkerExited(COMPONENT, "made up by a test"))
+                self.bus.emit(WorkerExited(COMPONENT, "made up by a test"))
             case "ready":
                 described = self.state.components[COMPONENT].description
-                self.bus.emit(events.WorkerReady(COMPONENT, described))
+                self.bus.emit(WorkerReady(COMPONENT, described))
             case _:
                 raise ValueError(what)
 

@@ -21,9 +21,10 @@ from tests.kit.host import HostInProcess, host_in_process, left_over
 from tests.kit.until import until
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core import events
 from nondum.host.core.clock import now
-from nondum.host.core.records import DriveState, Step
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.step import Step
 from nondum.host.lifecycle.recovery import recover
 from nondum.host.manager.state_folders import Folders, missing, sweep
 from nondum.host.sandbox.helper.mountinfo import mounted_below
@@ -177,8 +178,8 @@ async def bring_to_an_end(root: Path) -> Ended:
         refused = [p for p in host.snapshot.payloads if p.problems]
         for payload in refused:
             host.heard.clear()
-            host.bus.emit(events.RetryAsked(payload.key))
-            await host.until(lambda: any(isinstance(e, events.RetryAsked) for e in host.heard))
+            host.bus.emit(RetryAsked(payload.key))
+            await host.until(lambda: any(isinstance(e, RetryAsked) for e in host.heard))
             await until_settled(host)
         steps = {payload.version: payload.step for payload in host.snapshot.payloads}
         for slot in host.slots.iterdir():

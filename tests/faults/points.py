@@ -17,7 +17,7 @@ from tests.faults.ways import COMPONENT_WAYS, newer, sound, way
 from tests.kit.evidence import logged
 from tests.kit.fork_server import Nursery
 
-from nondum.host.core.records import Step
+from nondum.host.core.records.step import Step
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 
 ERRORS = ("ENOSPC", "EIO", "EMFILE", "ENOMEM", "EROFS")

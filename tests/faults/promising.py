@@ -21,7 +21,7 @@ from tests.kit.signing import Key, signed, trust_of
 from nondum.host.catalogue import opening
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core.records import Safety
+from nondum.host.core.records.safety import Safety
 from nondum.host.jobs import install as install_job
 from nondum.host.lifecycle import rebuilding
 from nondum.host.manager import installation

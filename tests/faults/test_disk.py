@@ -15,8 +15,8 @@ from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.reserve import RESERVE_BYTES
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.catalogue import CatalogueSetAside, CatalogueWritten
+from nondum.host.core.records.step import Step
 from nondum.host.manager import state_lock
 from nondum.host.manager.initial_components import install, uninstall
 from nondum.host.manager.installation import InstallOptions
@@ -137,7 +137,7 @@ async def test_withdrawal_does_not_wait_for_a_disk_that_cannot_be_written(
         assert host.catalogue.unwritten is not None
         assert not host.snapshot.components
         filler.unlink()
-        await host.until(lambda: isinstance(host.heard[-1], events.CatalogueWritten))
+        await host.until(lambda: isinstance(host.heard[-1], CatalogueWritten))
         assert "PayloadCleared" in [entry.event for entry in await host.journal()]
     async with host_in_process(small_disk, options=options) as host:
         assert not host.snapshot.payloads
@@ -200,7 +200,7 @@ async def test_all_that_is_here_outlives_the_catalogue(
     async with host_in_process(tmp_path) as host:
         await host.until_step(TORCH_ID, Step.ACTIVE)
         await host.until_step(LAMP_ID, Step.ACTIVE)
-        told = [event for event in host.heard if isinstance(event, events.CatalogueSetAside)]
+        told = [event for event in host.heard if isinstance(event, CatalogueSetAside)]
         codes = [problem.code for event in told for problem in event.problems]
         assert codes == ([] if harm == "log-gone" else ["CATALOGUE_REBUILT"])
         assert (host.catalogue.loss is None) == (harm == "log-gone")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,7 @@ def test_payload_is_named_by_the_next_daemon(tmp_path: Path, is_daemon_there: bo
         until_suspended(host)
         shown = host.run("why").ok().out
         assert f"plug in {BEACON_ID} 1.0" in shown
-        assert f"goal 1: {BEACON_ID} 1.0 (here until " in shown
-        assert "would do: test-beacon.shine; see `nondum advise 1`" in shown
+        assert re.search(rf"goal 1: {BEACON_ID} 1\.0\b.* test-beacon\.shine\b", shown)
         assert advised(host, LIT) == advised(host, "1") == advised(host, "shine") == ADVICE
 
 
@@ -84,4 +84,5 @@ def test_forgotten_payload_is_named_no_more(tmp_path: Path) -> None:
         until_suspended(host)
         shown = host.run("why").ok().out
         assert BEACON_ID not in shown
-        assert "goal 1: no payload that is known of would help; see `nondum advise 1`" in shown
+        [advice] = [line for line in shown.splitlines() if line.startswith("goal 1: ")]
+        assert "`nondum advise 1`" in advice

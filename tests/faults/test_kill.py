@@ -11,8 +11,8 @@ from tests.faults.ways import LAMP_ID, Way, sound
 from tests.kit.fork_server import Nursery
 from tests.kit.host import host_in_process
 
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.step import Step
 from nondum.host.lifecycle.crash_attribution import ATTEMPTS
 
 pytestmark = pytest.mark.slow
@@ -57,7 +57,7 @@ async def test_payload_that_takes_the_daemon_along_is_left_alone(
         assert [problem.code for problem in record.problems] == ["QUARANTINED"]
     async with host_in_process(tmp_path) as host:
         record = await host.until_step(LAMP_ID, left_alone)
-        host.bus.emit(events.RetryAsked(record.key))
+        host.bus.emit(RetryAsked(record.key))
         await host.until(lambda: host.snapshot.component("lamp") is not None)
 
 

@@ -15,12 +15,14 @@ from tests.faults.chains import CHAINS
 from tests.faults.model import Told, check, look, recover_twice
 from tests.kit.fork_server import Nursery
 
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.payloads import PayloadWithdrawn
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.trust import PayloadDistrusted
+from nondum.host.core.records.step import Step
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS, TRANSITIONS
 
 KILLED = -9
-ENDINGS = (events.PayloadSentAway, events.PayloadDistrusted, events.PayloadWithdrawn)
+ENDINGS = (PayloadSentAway, PayloadDistrusted, PayloadWithdrawn)
 """What may come at any step: one mechanism, so one of them is enough for each step."""
 BROUGHT_TO_LIFE = (Step.STORED, Step.PROBED, Step.ACTIVE)
 

@@ -17,7 +17,8 @@ from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 from tests.kit.until import until_async
 
-from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.jobs.children import START_S
 from nondum.host.manager.drive_reading import LOOK_S
 from nondum.host.manager.installation import COPY_SILENCE_S, InstallOptions

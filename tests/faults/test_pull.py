@@ -11,25 +11,36 @@ from tests.faults.ways import LAMP_ID, sound
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
-from nondum.host.core.records import Step
+from nondum.host.core.events.behaviours import BehaviourEnded, BehaviourEstablished
+from nondum.host.core.events.drives import DriveInserted, DriveRead
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    ComponentsProbed,
+    PayloadActivated,
+    PayloadCopied,
+    PayloadFound,
+    PayloadStaged,
+    PayloadVerified,
+    ProgressMade,
+    WheelsStored,
+)
+from nondum.host.core.records.step import Step
 
 pytestmark = pytest.mark.anyio
 
 GOOD = "org.example.good"
 
 PHASES: tuple[type[Event], ...] = (
-    events.DriveInserted,
-    events.PayloadFound,
-    events.DriveRead,
-    events.PayloadCopied,
-    events.PayloadVerified,
-    events.PayloadStaged,
-    events.WheelsStored,
-    events.ProgressMade,
-    events.ComponentsProbed,
-    events.PayloadActivated,
+    DriveInserted,
+    PayloadFound,
+    DriveRead,
+    PayloadCopied,
+    PayloadVerified,
+    PayloadStaged,
+    WheelsStored,
+    ProgressMade,
+    ComponentsProbed,
+    PayloadActivated,
 )
 
 
@@ -80,8 +91,8 @@ async def test_pull_in_the_middle_of_a_behaviour(tmp_path: Path) -> None:
         host.plug(tmp_path / "drive")
         await host.until_step(LAMP_ID, Step.ACTIVE)
         host.workers.behave("lamp", "shine", {"u": "spot__lamp__lamp"})
-        await until_event(host, events.BehaviourEstablished)
+        await until_event(host, BehaviourEstablished)
         host.pull()
         await check_undone(host, tmp_path)
-        ended = [event for event in host.heard if isinstance(event, events.BehaviourEnded)]
+        ended = [event for event in host.heard if isinstance(event, BehaviourEnded)]
         assert [event.component for event in ended] == ["lamp"]

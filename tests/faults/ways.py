@@ -10,9 +10,20 @@ from typing import Any
 from tests.kit.host import LAMP
 from tests.kit.payloads import Part, make_payload, seal, sha256
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
-from nondum.host.core.records import ComponentState, Step
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    PayloadCleared,
+    PayloadFailed,
+    PayloadRefused,
+    PayloadWithdrawn,
+    RetryAsked,
+)
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.releases import PayloadResumed, PayloadSuperseded, RollbackAsked
+from nondum.host.core.events.trust import PayloadDistrusted
+from nondum.host.core.events.workers import WorkerExited, WorkerFailed, WorkerReady
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.step import Step
 from nondum.sdk.description import PluginDescription
 
 LAMP_ID = "org.example.lamp"
@@ -149,34 +160,30 @@ REFUSED_AT: Mapping[Step, Write] = {
 }
 
 SPECIAL: Mapping[tuple[Step, type[Event]], Way] = {
-    (Step.STORED, events.PayloadFailed): Way({"a": broken}),
-    (Step.PROBED, events.PayloadFailed): Way(nudge=(("PROBED", "lost"),)),
-    (Step.ACTIVE, events.PayloadFailed): Way(
-        BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "lost"),)
-    ),
-    (Step.STORED, events.PayloadSuperseded): Way(
-        {"a": slow, "b": newer}, nudge=(("STORED", "plug"),)
-    ),
-    (Step.ACTIVE, events.PayloadSuperseded): Way(BOTH, ("plug a", "plug b")),
-    (Step.SUPERSEDED, events.PayloadResumed): Way(BOTH, ("plug a", "plug b", "pull b")),
-    (Step.SUPERSEDED, events.PayloadSentAway): Way(
+    (Step.STORED, PayloadFailed): Way({"a": broken}),
+    (Step.PROBED, PayloadFailed): Way(nudge=(("PROBED", "lost"),)),
+    (Step.ACTIVE, PayloadFailed): Way(BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "lost"),)),
+    (Step.STORED, PayloadSuperseded): Way({"a": slow, "b": newer}, nudge=(("STORED", "plug"),)),
+    (Step.ACTIVE, PayloadSuperseded): Way(BOTH, ("plug a", "plug b")),
+    (Step.SUPERSEDED, PayloadResumed): Way(BOTH, ("plug a", "plug b", "pull b")),
+    (Step.SUPERSEDED, PayloadSentAway): Way(
         BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "send"),)
     ),
-    (Step.SUPERSEDED, events.PayloadDistrusted): Way(
+    (Step.SUPERSEDED, PayloadDistrusted): Way(
         BOTH, ("plug a", "plug b"), nudge=(("SUPERSEDED", "distrust"),)
     ),
-    (Step.SUPERSEDED, events.PayloadWithdrawn): Way(BOTH, ("plug a", "plug b", "pull a")),
-    (Step.REFUSED, events.RollbackAsked): Way(
+    (Step.SUPERSEDED, PayloadWithdrawn): Way(BOTH, ("plug a", "plug b", "pull a")),
+    (Step.REFUSED, RollbackAsked): Way(
         BOTH, ("plug b", "plug a"), nudge=(("REFUSED", "rollback"),)
     ),
-    (Step.REMOVING, events.PayloadCleared): Way(nudge=(("ACTIVE", "pull"),)),
+    (Step.REMOVING, PayloadCleared): Way(nudge=(("ACTIVE", "pull"),)),
 }
 
 NUDGES: Mapping[type[Event], str] = {
-    events.PayloadWithdrawn: "pull",
-    events.PayloadSentAway: "send",
-    events.PayloadDistrusted: "distrust",
-    events.RetryAsked: "retry",
+    PayloadWithdrawn: "pull",
+    PayloadSentAway: "send",
+    PayloadDistrusted: "distrust",
+    RetryAsked: "retry",
 }
 
 
@@ -185,7 +192,7 @@ def way(step: Step, event: type[Event]) -> Way:
     if (step, event) in SPECIAL:
         return SPECIAL[step, event]
     comes = {Step.REFUSED: unfit, Step.QUARANTINED: broken}.get(step, sound)
-    if event is events.PayloadRefused:
+    if event is PayloadRefused:
         return Way({"a": REFUSED_AT[step]})
     if event in NUDGES:
         return Way({"a": comes}, nudge=((step.name, NUDGES[event]),))
@@ -193,15 +200,15 @@ def way(step: Step, event: type[Event]) -> Way:
 
 
 COMPONENT_WAYS: Mapping[tuple[ComponentState, type[Event]], Way] = {
-    (ComponentState.READY, events.WorkerExited): Way(nudge=(("ACTIVE", "exited"),)),
-    (ComponentState.RESTARTING, events.WorkerReady): Way(
+    (ComponentState.READY, WorkerExited): Way(nudge=(("ACTIVE", "exited"),)),
+    (ComponentState.RESTARTING, WorkerReady): Way(
         nudge=(("ACTIVE", "exited"), ("RESTARTING-WorkerExited", "ready"))
     ),
-    (ComponentState.READY, events.WorkerFailed): Way(nudge=(("ACTIVE", "lost"),)),
-    (ComponentState.RESTARTING, events.WorkerFailed): Way(
+    (ComponentState.READY, WorkerFailed): Way(nudge=(("ACTIVE", "lost"),)),
+    (ComponentState.RESTARTING, WorkerFailed): Way(
         nudge=(("ACTIVE", "exited"), ("RESTARTING-WorkerExited", "lost"))
     ),
-    (ComponentState.QUARANTINED, events.RetryAsked): Way(
+    (ComponentState.QUARANTINED, RetryAsked): Way(
         nudge=(("ACTIVE", "lost"), ("QUARANTINED-WorkerFailed", "retry"))
     ),
 }

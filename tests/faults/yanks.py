@@ -21,7 +21,7 @@ from tests.kit.loop_devices import attach, cut_off, detach
 from tests.kit.payloads import Part, make_payload, make_wheel
 from tests.kit.until import until_async
 
-from nondum.host.core.records import Step
+from nondum.host.core.records.step import Step
 from nondum.host.manager.state_folders import Folders
 from nondum.host.sandbox.helper.mountinfo import mounted_below
 from nondum.host.sources.drives.blocks import BlockSource

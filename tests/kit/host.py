@@ -12,8 +12,13 @@ from tests.kit.until import arrived
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.bus import Bus
-from nondum.host.core.events import Event, HostStarted, WheelsCompiled
-from nondum.host.core.records import JournalEntry, PayloadRecord, Snapshot, Step
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import WheelsCompiled
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.lifecycle.advance import RULES
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.component_manager import ComponentManager

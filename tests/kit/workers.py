@@ -18,10 +18,12 @@ from tests.kit.processes import children
 from tests.kit.until import PATIENCE_S, arrived, until_async
 
 from nondum.host.config.confinement_level import ConfinementState, parse_wanted
-from nondum.host.core.events import BehaviourEnded, Event, WorkerExited, WorkerReady
+from nondum.host.core.events.behaviours import BehaviourEnded
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.workers import WorkerExited, WorkerReady
 from nondum.host.workers import confinement_choice
 from nondum.host.workers.call import Call
-from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.confinement import Confinement
 from nondum.host.workers.launcher import MARK, WorkerLauncher
 from nondum.host.workers.spec import Limits, Timing, WorkerSpec, base_interpreter
 from nondum.host.workers.workers import Workers

@@ -132,7 +132,10 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_S}/packets.py": (f"{_TS}/test_link.py",),
     f"{_S}/link.py": (f"{_TS}/test_link.py",),
     f"{_S}/wire.py": (f"{_TS}/test_wire.py",),
-    f"{_S}/wire_fields.py": (f"{_TS}/test_wire.py",),
+    f"{_S}/wire_fields.py": (f"{_TS}/test_wire.py", f"{_TT}/streams/test_packets.py"),
+    f"{_S}/packet_codec.py": (f"{_TS}/test_codec.py",),
+    f"{_S}/codec/values.py": (f"{_TS}/test_codec.py",),
+    f"{_S}/codec/checks.py": (f"{_TS}/test_codec.py",),
     f"{_S}/description.py": (f"{_TS}/test_description.py",),
     f"{_S}/source_check.py": (f"{_TS}/test_source_check.py",),
     f"{_S}/signature.py": (f"{_TS}/test_signature.py",),
@@ -253,9 +256,8 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/peers/link.py": (f"{_TT}/peers/test_presence.py",),
     f"{_T}/peers/messages.py": (f"{_TT}/peers/test_messages.py",),
     f"{_T}/peers/node.py": (*_ADMISSION, f"{_TT}/peers/test_received.py"),
-    f"{_T}/peers/pairing.py": _PAIRING,
+    f"{_T}/peers/pairing.py": (*_PAIRING, f"{_TT}/peers/test_pairing_messages.py"),
     f"{_T}/peers/pairing_channel.py": (*_PAIRING[1:], f"{_TT}/peers/test_descriptors.py"),
-    f"{_T}/peers/pairing_messages.py": (f"{_TT}/peers/test_pairing_messages.py",),
     f"{_T}/peers/presence.py": (f"{_TT}/peers/test_presence.py",),
     f"{_T}/peers/private_file.py": _PEER_KEYS,
     f"{_T}/peers/proof.py": (f"{_TT}/peers/test_proof.py",),
@@ -296,6 +298,8 @@ FOLDERS = (
 
 _BUILDS = "builds payloads, which are judged where they are plugged in"
 _SPEAKS = "finds words for what another has refused"
+_ORDERED = "refuses what a person orders and what is not so here"
+_ASKED = "refuses questions about what is not here"
 _WHOLE = (
     "is tried with whole daemons (tests/daemon/test_placed_by_strangers.py), step by step not yet"
 )
@@ -304,8 +308,12 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/trust/vocabulary_check.py": "remarks on a payload's words; planning judges them",
     f"{_H}/sandbox/helper/lamps.py": "shows a state; refuses lamps that this machine lacks",
     f"{_H}/sandbox/helper/stop_key.py": "reads one key; refuses devices that lack it",
-    f"{_H}/control/orders.py": "refuses what a person orders and what is not so here",
-    f"{_H}/control/questions.py": "refuses questions about what is not here",
+    f"{_H}/control/goal_orders.py": _ORDERED,
+    f"{_H}/control/mount_orders.py": _ORDERED,
+    f"{_H}/control/payload_orders.py": _ORDERED,
+    f"{_H}/control/stream_orders.py": _ORDERED,
+    f"{_H}/control/log_questions.py": _ASKED,
+    f"{_H}/control/mind_questions.py": _ASKED,
     f"{_H}/control/rows.py": "tells problems that others have found",
     f"{_H}/workers/streams.py": "wires inputs; tells which of them is ambiguous",
     f"{_T}/streams/broker.py": "introduces the ends of a stream to each other",
@@ -339,11 +347,13 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/manager/initial_components.py": _RUNS,
     f"{_H}/lifecycle/recovery.py": _RUNS,
     f"{_H}/lifecycle/releases.py": "puts what was admitted in order",
-    f"{_H}/workers/confinements.py": "test_restrict.py leaves out each thing that it takes away",
+    f"{_H}/workers/unconfined.py": "test_restrict.py leaves out each thing that it takes away",
     f"{_H}/workers/init_link.py": _RUNS,
     f"{_H}/workers/problems.py": _SPEAKS,
     f"{_H}/workers/supervisor.py": _RUNS,
+    f"{_H}/workers/running_calls.py": _SPEAKS,
     f"{_H}/workers/worker.py": _SPEAKS,
+    f"{_H}/workers/worker_start.py": _SPEAKS,
     f"{_H}/workers/workers.py": _RUNS,
     f"{_T}/discovery/discovery.py": "tells of hints that have no address to go to",
     f"{_T}/discovery/interfaces.py": "reads what the kernel lists",
@@ -417,9 +427,6 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/peers/certificate.py", "len(data) > MAX_BYTES"): _FORM,
     (f"{_T}/peers/certificate.py", "header != _HEADER"): _FORM,
     (f"{_T}/peers/certificate.py", 'names != (*_FIELDS, "")'): _FORM,
-    (f"{_T}/peers/messages.py", "not isinstance(problems, list)"): (
-        "what else there may be has no problem in it, which is refused for that"
-    ),
     (f"{_T}/fleet/zenoh_node.py", "link.session is None and not link.is_over"): (
         "tells of a host that does not answer, which is let in by nothing"
     ),

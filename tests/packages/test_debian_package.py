@@ -18,7 +18,7 @@ import pytest
 from tests.packages.checkout import copied
 from tests.packages.conftest import ROOT, Build, Package
 
-from nondum.host.config import host_config
+from nondum.host.config import host_config, parsing
 from nondum.wheelhouse.wheels.elf import ARCHITECTURES, HEAD_BYTES, Elf
 
 pytestmark = [
@@ -102,7 +102,7 @@ def test_configuration_is_a_conffile_that_the_daemon_reads(tree: Tree, architect
     assert (root / "DEBIAN/conffiles").read_text() == f"{host_config.SYSTEM_FILE}\n"
     file = root / host_config.SYSTEM_FILE.relative_to("/")
     defaults = host_config.HostConfig()
-    assert host_config.load(file, defaults) == defaults, "as delivered it changes nothing"
+    assert parsing.load(file, defaults) == defaults, "as delivered it changes nothing"
 
 
 @both
@@ -111,7 +111,7 @@ def test_commented_keys_are_keys(tree: Tree, architecture: str) -> None:
     lines = [
         line[2:] if line.startswith("# ") and " = " in line else line for line in text.splitlines()
     ]
-    host_config.parse("\n".join(lines), "host.toml", host_config.HostConfig())
+    parsing.parse("\n".join(lines), "host.toml", host_config.HostConfig())
 
 
 @both

@@ -6,6 +6,7 @@ from importlib import resources
 from itertools import permutations
 
 import pytest
+from tests.kit.golden import Golden
 from tests.planning.fragments import HOST, brings
 
 from nondum.planning.merge.contribution import Contribution
@@ -284,13 +285,13 @@ def test_wrong_problem_keeps_its_component_out(init: str, code: str, message: st
     assert message in found.message
 
 
-def test_lasting_behaviour_has_no_effects_under_conditions() -> None:
+def test_lasting_behaviour_has_no_effects_under_conditions(golden: Golden) -> None:
     body = """(:predicates (up)) (:action go :parameters (?u - base)
               :effect (and (not (idle ?u)) (when (ready ?u) (up))))"""
     behaviour = Behaviour("go", "(go ?u - base)", lasting=True)
     found = refused(brings("drive", body, units={"wheels": "base"}, behaviours=(behaviour,)))
     assert found.code == "PDDL_UNSUPPORTED"
-    assert "'go' is lasting, and has effects under conditions" in found.message
+    golden.check_line("a lasting action has conditional effects", found.message)
 
 
 def test_stranger_may_not_write_what_follows_from_another_ones_rules() -> None:
@@ -303,7 +304,7 @@ def test_stranger_may_not_write_what_follows_from_another_ones_rules() -> None:
     assert "arm 1.0 domain.pddl:1:" in problem.message
 
 
-def test_circle_through_two_strangers_rules_keeps_the_later_one_out() -> None:
+def test_circle_through_two_strangers_rules_keeps_the_later_one_out(golden: Golden) -> None:
     words = "(:predicates (up) (down))"
     first = brings("arm", words + "(:derived (up) (not (down)))")
     second = brings("base", words + "(:derived (down) (not (up)))")
@@ -311,7 +312,7 @@ def test_circle_through_two_strangers_rules_keeps_the_later_one_out() -> None:
     result = merge([second, first], HOST)
     [problem] = result.quarantined["base"]
     assert problem.code == "PDDL_DERIVED"
-    assert "these hold only if they do not: down, up" in problem.message
+    golden.check_line("derived facts contradict each other", problem.message)
 
 
 def test_values_of_functions_are_kept() -> None:
@@ -335,7 +336,7 @@ def test_all_problems_are_told_at_once() -> None:
 
 def test_nearest_name_is_suggested() -> None:
     body = "(:action go :parameters (?u - base) :precondition (redy ?u))"
-    assert refused(brings("drive", body)).fix == "did you mean 'ready'?"
+    assert "'ready'" in refused(brings("drive", body)).fix
 
 
 def test_syntax_error_names_its_plugin() -> None:
@@ -345,7 +346,8 @@ def test_syntax_error_names_its_plugin() -> None:
 def test_undeclared_parent_is_taken_with_a_warning() -> None:
     result = merged(brings("drive", "(:types cart - vehicle)"))
     assert result.domain.types.is_kind_of("cart", "vehicle")
-    assert "type 'vehicle' is not declared" in result.warnings[0].message
+    assert result.warnings[0].code == "PDDL_UNKNOWN"
+    assert "'vehicle'" in result.warnings[0].message
 
 
 def test_mistakes_beyond_measure_are_cut_off() -> None:
@@ -376,10 +378,10 @@ def test_lasting_behaviour_may_take_its_unit() -> None:
     assert result.action("drive.go").behaviour == "go"
 
 
-def test_finishing_behaviour_may_not_take_anything() -> None:
+def test_finishing_behaviour_may_not_take_anything(golden: Golden) -> None:
     found = refused(brings("drive", GO, behaviours=(Behaviour("go", "(go ?u - base)"),)))
     assert found.code == "PDDL_OWNED"
-    assert "only a lasting behaviour may take (idle ?u)" in found.message
+    golden.check_line("a finishing behaviour takes a unit", found.message)
 
 
 BEHAVIOURS = {
@@ -484,12 +486,12 @@ def test_predicate_is_one_whatever_its_variables_are_called() -> None:
     assert not result.warnings
 
 
-def test_wider_predicate_is_kept_with_a_warning() -> None:
+def test_wider_predicate_is_kept_with_a_warning(golden: Golden) -> None:
     result = merged(
         brings("a", "(:predicates (at ?u - base))"), brings("b", "(:predicates (at ?u - unit))")
     )
     assert result.domain.predicates["at"].parameters == (("unit",),)
-    assert "taken as the wider one" in result.warnings[0].message
+    golden.check_line("a predicate is declared wider elsewhere", result.warnings[0].message)
 
 
 def test_more_specific_type_of_a_shared_object_is_kept() -> None:
@@ -534,7 +536,7 @@ def test_two_versions_with_one_schema_share_it() -> None:
 
 
 def test_component_that_speaks_twice_is_a_mistake() -> None:
-    with pytest.raises(ValueError, match="two contributions of drive on rover"):
+    with pytest.raises(ValueError, match="drive on rover"):
         merge([brings("drive", GO), brings("drive", "(:types x)")], HOST)
 
 

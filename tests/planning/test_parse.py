@@ -197,7 +197,7 @@ def test_byte_order_mark_is_passed_over() -> None:
 
 
 def test_nearest_keyword_is_suggested() -> None:
-    assert refused("(define (domain d) (:predicate (a)))").fix == "did you mean ':predicates'?"
+    assert "':predicates'" in refused("(define (domain d) (:predicate (a)))").fix
 
 
 @pytest.mark.parametrize(

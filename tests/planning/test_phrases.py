@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.golden import Golden
 from tests.planning.strangers import (
     COMPTON_CAMERA,
     MOBILE_BASE,
@@ -89,19 +90,18 @@ def test_same_meaning_twice_is_not_ambiguous() -> None:
     assert book(BASE, other, DETECTOR).goal("follow me").kind == "maintain"
 
 
-def test_different_meanings_are_told() -> None:
+def test_different_meanings_are_told(golden: Golden) -> None:
     speaker = replace(
         saying(SPEAKER), phrases=(Phrase("follow {c:class}", "(reported ?c self)", "achieve"),)
     )
-    with pytest.raises(GoalRefused, match=r"may mean .*following.* or .*reported") as refused:
+    with pytest.raises(GoalRefused) as refused:
         book(BASE, speaker, DETECTOR).goal("follow me")
     [problem] = refused.value.problems
     assert problem.code == "PHRASE_AMBIGUOUS"
-    assert '"follow {c:class} [through {words:text}]" of mobile-base' in problem.message
-    assert '"follow {c:class}" of speaker' in problem.message
+    golden.check("two components mean other things", problem.message)
 
 
-def test_label_of_two_objects_is_ambiguous() -> None:
+def test_label_of_two_objects_is_ambiguous(golden: Golden) -> None:
     goose = PluginDescription(
         "goose-detector", "1", fragments=DETECTOR.fragments[:1], labels=(Label("goose", "me"),)
     )
@@ -113,7 +113,7 @@ def test_label_of_two_objects_is_ambiguous() -> None:
         book(BASE, DETECTOR, goose).goal("follow me")
     [problem] = refused.value.problems
     assert problem.code == "PHRASE_AMBIGUOUS"
-    assert problem.fix == 'say: "follow goose", "follow person"; or give the goal in PDDL'
+    golden.check("two names can be meant", problem.fix)
 
 
 def test_unknown_sentence_gets_near_phrases() -> None:
@@ -137,13 +137,14 @@ def test_unknown_name_gets_known_ones() -> None:
         book(POINTER, COMPTON).goal("point at the moon")
     problem = refused.value.problems[0]
     assert problem.code == "PHRASE_WORDS_UNKNOWN"
-    assert "no target is called 'the moon'" in problem.message
+    assert all(name in problem.message for name in ("target", "'the moon'"))
     assert '"the radiation source"' in problem.fix
 
 
 def test_name_of_another_type_is_not_taken() -> None:
-    with pytest.raises(GoalRefused, match="no target is called 'me'"):
+    with pytest.raises(GoalRefused, match=r"target .*'me'") as refused:
         book(POINTER, COMPTON, DETECTOR).goal("point at me")
+    assert refused.value.code == "PHRASE_WORDS_UNKNOWN"
 
 
 def test_offers_list_what_can_be_said() -> None:

@@ -126,7 +126,7 @@ def test_unknown_type_is_told_where_it_stands_and_nowhere_else() -> None:
     with pytest.raises(FragmentRefused) as error:
         loaded(PROBLEM.format(metric=""), DOMAIN.replace("(at ?s - ship", "(at ?s - shop"))
     assert [problem.where for problem in error.value.problems] == ["domain.pddl:3:20"]
-    assert error.value.problems[0].fix == "did you mean 'ship'?"
+    assert "'ship'" in error.value.problems[0].fix
 
 
 def test_nothing_is_above_object() -> None:
@@ -147,7 +147,7 @@ def test_circle_of_rules_names_those_that_deny_each_other() -> None:
 def test_problem_of_another_domain_is_told() -> None:
     [warning] = loaded(PROBLEM.format(metric="").replace(":domain ferry", ":domain boat")).warnings
     assert warning.code == "PDDL_DOMAIN"
-    assert "one of domain 'boat'" in warning.message
+    assert "'boat'" in warning.message
     assert not loaded(PROBLEM.format(metric="")).warnings
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.kit.golden import Golden
 from tests.planning.simulation import Robot, Troubles, task_tree
 from tests.planning.tasks import (
     FOLLOW_LASTING,
@@ -51,13 +52,13 @@ def test_steps_wait_run_and_are_done() -> None:
     let_pass(robot, tree, "done done done")
 
 
-def test_waiting_step_says_what_it_lacks_and_which_step_gives_it() -> None:
+def test_waiting_step_says_what_it_lacks_and_which_step_gives_it(golden: Golden) -> None:
     _, tree = carrying()
     tree.tick_once()
     _, move, drop = where(tree)
     assert move.after == (0,)
     assert [(link.fact, link.provider) for link in drop.lacks] == [("at b", 1), ("held ball0", 0)]
-    assert drop.why == "comes after move a b, for (at b), (held ball0)"
+    golden.check("a step comes after another", drop.why)
 
 
 def test_step_says_who_needs_it() -> None:
@@ -87,35 +88,35 @@ def test_achieved_step_that_never_ran_is_skipped() -> None:
     assert states(tree) == "skipped skipped running"
 
 
-def test_step_that_keeps_failing_is_excluded() -> None:
+def test_step_that_keeps_failing_is_excluded(golden: Golden) -> None:
     robot, tree = carrying(Troubles(fails=1.0))
     let_pass(robot, tree, "excluded waiting waiting")
-    assert where(tree)[0].why == "left out: it failed 3 times: it went wrong"
+    golden.check("a step is excluded", where(tree)[0].why)
 
 
-def test_chain_is_kept_for_its_users() -> None:
+def test_chain_is_kept_for_its_users(golden: Golden) -> None:
     robot = Robot(follow_task(), FOLLOW_LASTING)
     tree = task_tree(robot, plan_of(robot.task, *FOLLOW_PLAN), kind="maintain")
     let_pass(robot, tree, "kept kept kept kept")
     camera, *_, drive = where(tree)
-    assert camera.why == f"runs for {FOLLOW_PLAN[1]}"
+    golden.check("a step is kept for another", camera.why, user=FOLLOW_PLAN[1])
     assert camera.takes == ("free cam-img",)
     assert not camera.exclusive
     assert (drive.exclusive, drive.takes) == (True, ("idle base",))
 
 
-def test_step_without_its_unit_is_halted_and_then_stuck() -> None:
+def test_step_without_its_unit_is_halted_and_then_stuck(golden: Golden) -> None:
     robot = Robot(follow_task(), FOLLOW_LASTING)
     tree = task_tree(robot, plan_of(robot.task, *FOLLOW_PLAN), kind="maintain")
     let_pass(robot, tree, "kept kept kept kept")
     robot.world.forget("ready trk", "truth", robot.now_s)
     tree.tick_once()
     assert states(tree) == "kept kept halting halting"
-    assert where(tree)[2].why == "being halted: its guard is broken: (ready trk) does not hold"
+    golden.check("a step is halting", where(tree)[2].why)
     robot.moment()
     tree.tick_once()
     assert states(tree) == "kept kept waiting waiting"
-    assert where(tree)[2].why.startswith("the plan is stuck: (ready trk) does not hold")
+    golden.check("the plan is stuck", where(tree)[2].why)
 
 
 def test_actuator_in_use_is_waited_for() -> None:

@@ -6,6 +6,7 @@ from random import Random
 
 import pytest
 from py_trees.common import Status
+from tests.kit.golden import Golden
 from tests.planning.simulation import Robot, Troubles, check_safety, run, task_tree
 from tests.planning.tasks import (
     FOLLOW_LASTING,
@@ -206,13 +207,13 @@ def test_behaviour_that_gets_on_is_waited_for() -> None:
     assert tree.control.phase is Phase.UNDER_WAY
 
 
-def test_failing_action_is_given_up_after_its_attempts() -> None:
+def test_failing_action_is_given_up_after_its_attempts(golden: Golden) -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(fails=1.0))
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
     let_pass(robot, tree, 30)
     assert tree.status is Status.FAILURE
     assert tree.control.exhausted == ("pick ball0 a",)
-    assert tree.needs_replan == "pick ball0 a failed 3 times: it went wrong"
+    golden.check("an action failed too often", tree.needs_replan or "")
     assert robot.started == ["pick ball0 a"] * 3
 
 
@@ -227,17 +228,17 @@ def test_only_a_lasting_action_holds_for_a_while() -> None:
     assert set(tree.control.proven(robot.now_s + 3600)) == set(FOLLOW_PLAN)
 
 
-def test_action_that_fails_as_it_is_started_is_tried_again_and_tells_why() -> None:
+def test_action_that_fails_as_it_is_started_is_tried_again_and_tells_why(golden: Golden) -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(refuses=1.0))
     tree = task_tree(robot, plan_of(robot.task, "pick ball0 a", "move a b", "drop ball0 b"))
     tree.tick_once()
     assert (tree.control.phase, tree.needs_replan) == (Phase.UNDER_WAY, None)
     let_pass(robot, tree, 5)
     assert robot.started == ["pick ball0 a"] * 3
-    assert tree.needs_replan == "pick ball0 a failed 3 times: not now"
+    golden.check("an action was refused too often", tree.needs_replan or "")
 
 
-def test_effects_may_take_their_time_to_be_seen() -> None:
+def test_effects_may_take_their_time_to_be_seen(golden: Golden) -> None:
     robot = Robot(gripper_task(1), frozenset(), troubles=Troubles(silent=1.0))
     tree = task_tree(
         robot,
@@ -247,7 +248,7 @@ def test_effects_may_take_their_time_to_be_seen() -> None:
     let_pass(robot, tree)
     assert robot.started == ["pick ball0 a"]
     assert tree.status is Status.RUNNING
-    assert tree.steps[0].why() == "waits for its effects to be seen"
+    golden.check("effects are not seen yet", tree.steps[0].why())
 
 
 def test_next_tree_takes_over_what_it_needs() -> None:
@@ -338,17 +339,15 @@ def test_behaviours_that_hold_each_other_up_fall() -> None:
     assert not robot.running
 
 
-def test_every_leaf_says_why() -> None:
+def test_every_leaf_says_why(golden: Golden) -> None:
     robot, tree = following()
-    assert [leaf.why() for leaf in tree.steps] == [
-        f"runs for {DETECT}",
-        f"runs for {TRACK}",
-        f"runs for {DRIVE}",
-        "runs for the goal",
-    ]
+    *chain, last = (leaf.why() for leaf in tree.steps)
+    for why, user in zip(chain, (DETECT, TRACK, DRIVE), strict=True):
+        golden.check("a step runs for another", why, user=user)
+    golden.check("a step runs for the goal", last)
     robot.lose("cam", moments=1000)
     tree.tick_once()
-    assert "(ready cam) does not hold" in tree.why()
+    golden.check("a camera is lost", tree.why())
 
 
 def empty_task() -> GroundTask:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from tests.kit.golden import Golden
 
 from nondum.planning.execute.provenance import Source
 from nondum.planning.execute.world import MOST_DENIALS, WorldModel
@@ -158,12 +159,12 @@ def said(sources: tuple[Source, ...]) -> list[str]:
     return [source.said for source in sources]
 
 
-def test_evidence_tells_both_sides(world: WorldModel) -> None:
+def test_evidence_tells_both_sides(world: WorldModel, golden: Golden) -> None:
     stream(world)
     free = world.evidence("free img")
     assert not free.holds
-    assert said(free.pros) == ["nothing uses it"]
-    assert said(free.cons) == ["stream cam is established"]
+    golden.check("a stream would be free", "\n".join(said(free.pros)))
+    golden.check("a stream is used", "\n".join(said(free.cons)))
     assert free.cons[0].action == "stream cam"
     flowing = world.evidence("flowing img")
     assert (flowing.holds, flowing.since_s) == (True, 1.0)
@@ -246,14 +247,15 @@ def test_running_behaviour_hides_a_place_until_it_ends(placed: WorldModel) -> No
     assert placed.facts == {"at cup a"}
 
 
-def test_newest_of_two_observers_wins_and_both_are_named(placed: WorldModel) -> None:
+def test_newest_of_two_observers_wins_and_both_are_named(
+    placed: WorldModel, golden: Golden
+) -> None:
     placed.know("at cup a", "left", 1.0)
     placed.know("at cup b", "right", 0.0)
     assert placed.facts == {"at cup a"}
     [problem] = placed.conflicts()
     assert problem.code == "PDDL_FACT_CONFLICT"
-    assert "left says (at cup a), right says (at cup b)" in problem.message
-    assert "the newest is believed: (at cup a)" in problem.message
+    golden.check("two observers contradict each other", problem.message)
     placed.forget("at cup a", "left", 2.0)
     assert placed.facts == {"at cup b"}
     assert not placed.conflicts()

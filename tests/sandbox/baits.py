@@ -21,10 +21,10 @@ from typing import Any
 from tests.kit.workers import WorkersUnderTest
 from tests.sandbox.escape import ATTEMPTS
 
-from nondum.host.core.events import WorkerLogged
+from nondum.host.core.events.workers import WorkerLogged
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.inside import mounts
-from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.confinement import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Limits
 from nondum.sdk.errors import WorkerFailed

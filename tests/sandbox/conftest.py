@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.boxed import Boxed
 
 
 @pytest.fixture

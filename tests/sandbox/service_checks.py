@@ -23,13 +23,13 @@ from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest
 from tests.sandbox.guests import status
 from tests.sandbox.service import GROUP, LINE, LINE_OF_GROUP, STATE, USER
 
-from nondum.host.core.events import WorkerExited, WorkerLogged
+from nondum.host.core.events.workers import WorkerExited, WorkerLogged
 from nondum.host.manager.state_folders import remove
 from nondum.host.sandbox.helper import HelperClient
 from nondum.host.sandbox.helper.worker_users import OF_SERVICE
 from nondum.host.sandbox.levels.users import Users
 from nondum.host.workers import confinement_choice, confinement_probe, scratch
-from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.confinement import Confinement
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits, WorkerSpec

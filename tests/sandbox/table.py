@@ -14,7 +14,10 @@ from pathlib import Path
 from tests.sandbox.baits import attempted, laid
 from tests.sandbox.escape import ATTEMPTS
 
-from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
+from nondum.host.workers.unconfined import Unconfined
 from nondum.wheelhouse.format.confinement import Level
 
 PAGE = Path(__file__).parents[2] / "docs/confinement.md"

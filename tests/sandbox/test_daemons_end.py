@@ -21,7 +21,7 @@ BWRAP = shutil.which("bwrap") or "bwrap"
 STARTUP_S = 60.0
 DAEMON = f"""
 import signal, sys
-from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.boxed import Boxed
 from nondum.host.workers.spare import Spare
 
 bwrap, has_users, is_settled = sys.argv[1], *(word == "yes" for word in sys.argv[2:])

@@ -14,7 +14,10 @@ from tests.sandbox.escape import ATTEMPTS
 
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
-from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
+from nondum.host.workers.unconfined import Unconfined
 
 pytestmark = pytest.mark.anyio
 

@@ -14,10 +14,13 @@ from tests.kit.workers import WorkersUnderTest
 from tests.sandbox.guests import does, guest, parent, status
 
 from nondum.host.sandbox.inside import kernel
-from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
 from nondum.host.workers.init_link import InitLink
 from nondum.host.workers.launcher import parameters
 from nondum.host.workers.spare import PLACEHOLDER, PLACEHOLDER_BYTES
+from nondum.host.workers.unconfined import Unconfined
 
 pytestmark = pytest.mark.anyio
 BWRAP = shutil.which("bwrap") or "bwrap"

@@ -14,7 +14,7 @@ from tests.kit.workers import WorkersUnderTest
 from tests.sandbox.guests import does, guest, owner
 
 from nondum.host.sandbox.levels.users import FIRST_USER, is_workers
-from nondum.host.workers import confinements
+from nondum.host.workers import granted_nodes
 from nondum.host.workers.device_ownership import DeviceOwnership
 
 pytestmark = [
@@ -92,6 +92,6 @@ def sounds() -> Iterator[Path]:
 async def test_worker_is_in_the_groups_of_what_its_permissions_stand_for(
     tested: WorkersUnderTest, sounds: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confinements, "NODES", {"audio": (str(sounds),)})
+    monkeypatch.setattr(granted_nodes, "NODES", {"audio": (str(sounds),)})
     await guest(tested, OPENS.format(path=repr(str(sounds / "zero"))), ("audio",))
     assert await does(tested) == ""

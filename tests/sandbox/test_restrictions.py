@@ -14,7 +14,9 @@ import pytest
 from tests.sandbox.baits import SMALL, attempted, laid, unlimited
 
 from nondum.host.sandbox.levels import bubblewrap, refusals
-from nondum.host.workers.confinements import Boxed, Confinement, Held
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
 
 pytestmark = pytest.mark.anyio
 

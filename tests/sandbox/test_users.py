@@ -10,15 +10,16 @@ from pathlib import Path
 
 import pytest
 from tests.kit.descriptors import descriptors_left, open_descriptors
+from tests.kit.golden import Golden
 from tests.kit.workers import WorkersUnderTest
 from tests.sandbox.guests import open_folder, owner, status
 
-from nondum.host.core.events import WorkerLogged
+from nondum.host.core.events.workers import WorkerLogged
 from nondum.host.manager.state_folders import remove
 from nondum.host.sandbox.helper.worker_users import OF_ROOT
 from nondum.host.sandbox.levels.users import FIRST_USER, Users, is_workers
 from nondum.host.workers import scratch
-from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.boxed import Boxed
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spare import Spare
 from nondum.sdk.errors import WorkerFailed
@@ -197,7 +198,7 @@ def test_scratch_that_is_too_deep_to_be_given_is_emptied(folder: Path) -> None:
 
 
 async def test_worker_works_as_the_hosts_user_where_only_root_may_read_its_code(
-    tested: WorkersUnderTest, caplog: pytest.LogCaptureFixture
+    tested: WorkersUnderTest, caplog: pytest.LogCaptureFixture, golden: Golden
 ) -> None:
     before = os.umask(0o077)
     try:
@@ -205,7 +206,8 @@ async def test_worker_works_as_the_hosts_user_where_only_root_may_read_its_code(
     finally:
         os.umask(before)
     assert owner(place) == 0
-    assert "only that may read" in caplog.text
+    code = tested.folder / "guest/site-packages"
+    golden.check_line("the umask hides the store", "\n".join(caplog.messages), code=code)
 
 
 async def test_hosts_own_mask_does_not_shut_the_worker_out(tested: WorkersUnderTest) -> None:

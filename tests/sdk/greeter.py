@@ -27,6 +27,7 @@ from nondum.sdk import (
 )
 
 DOMAIN = "(define (domain greeter) (:predicates (greeted ?h - host)))"
+NO_ONE = "no one is there"
 
 
 @hookimpl
@@ -83,7 +84,7 @@ async def greet(ctx: Context, u: str, h: str) -> str:
     ctx.progress(0.5, "clearing the throat")
     ctx.output("words").send(Text(Header(frame_id=u), f"hello {h}"))
     if h == "absent":
-        raise BehaviourFailed("no one is there")
+        raise BehaviourFailed(NO_ONE)
     if h == "error":
         raise ZeroDivisionError("a mistake of the author")
     ctx.know("greeted", h)

@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from tests.kit.golden import Golden
 
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.core import core
@@ -29,6 +30,7 @@ from nondum.sdk import (
 )
 from nondum.sdk.action_fragment import CORE_PREDICATES, CORE_TYPES, CORE_UNITS
 from nondum.sdk.bench import WorkerFactory
+from nondum.sdk.errors import Problem
 
 
 def plugin(*behaviours: Any, unit: str = "lamp", pddl: str = "") -> ModuleType:
@@ -75,10 +77,14 @@ def merged(made: ModuleType) -> Merged:
     return found
 
 
-def wrongs(made: ModuleType) -> list[str]:
+def wrongs(made: ModuleType) -> tuple[Problem, ...]:
     with pytest.raises(WorkerFailed) as caught:
         described(made)
-    return [f"{problem.code} {problem}" for problem in caught.value.problems]
+    return caught.value.problems
+
+
+def words(problem: Problem) -> str:
+    return f"{problem.message} → {problem.fix}"
 
 
 def test_behaviour_has_the_name_of_its_action_and_the_host_that_its_effect_speaks_of() -> None:
@@ -217,59 +223,65 @@ def test_quantified_variables_are_known() -> None:
 
 
 @pytest.mark.parametrize(
-    ("makes", "needs", "told"),
+    ("makes", "needs", "situation"),
     [
-        ("", "(idle ?u)", "does not say what it makes"),
-        ("", "", "does not say what it makes"),
-        ("lit", "", "'lit' is not one formula"),
-        ("()", "", "'()' is not one formula"),
-        ("(lit ?u) (seen ?u)", "", "is not one formula"),
-        ("(lit ?u", "", "has a `(` that is not closed"),
-        ("(lit ?u))", "", "has a `)` too many"),
-        ("(" * 70 + ")" * 70, "", "nested more than 64 deep"),
-        ("(lit ?x)", "", "?x is no parameter of the action"),
-        ("(lit ?u)", "(= ?u ?x)", "?x is no parameter of the action"),
-        ("(lit self)", "", "'self' names one host"),
-        ("(lit ?u - light)", "", "'-' stands where a parameter or a name belongs"),
-        ("(increase (total-cost) 3)", "", "'(total-cost)' stands where"),
-        ("(and lit)", "", "'lit' is no condition and no effect"),
-        ("(?u lit)", "", "'(?u lit)' is no condition and no effect"),
-        ("(forall (?c) (lit ?c))", "", "the variables '(?c)' cannot be read"),
-        ("(forall (?c - colour) (lit ?c))", "", "type 'colour' is not declared"),
-        ("(on ?u)", "", "predicate 'on' has 1 arguments here, else 2"),
-        ("(and (lit ?u) (lit ?u ?u))", "", "predicate 'lit' has 2 arguments here, else 1"),
-        ("(lit ?u)", "(idle ?u", "that is not closed"),
+        ("", "(idle ?u)", "it needs, and makes nothing"),
+        ("", "", "it makes nothing"),
+        ("lit", "", "a word"),
+        ("()", "", "an empty formula"),
+        ("(lit ?u) (seen ?u)", "", "two formulas"),
+        ("(lit ?u", "", "a bracket is not closed"),
+        ("(lit ?u))", "", "a bracket too many"),
+        ("(" * 70 + ")" * 70, "", "seventy brackets"),
+        ("(lit ?x)", "", "an unknown parameter is made"),
+        ("(lit ?u)", "(= ?u ?x)", "an unknown parameter is needed"),
+        ("(lit self)", "", "self"),
+        ("(lit ?u - light)", "", "a type in an effect"),
+        ("(increase (total-cost) 3)", "", "a cost"),
+        ("(and lit)", "", "a word in a conjunction"),
+        ("(?u lit)", "", "a parameter for a predicate"),
+        ("(forall (?c) (lit ?c))", "", "a variable without a type"),
+        ("(forall (?c - colour) (lit ?c))", "", "an unknown type"),
+        ("(on ?u)", "", "too few arguments for the core"),
+        ("(and (lit ?u) (lit ?u ?u))", "", "one and two arguments"),
+        ("(lit ?u)", "(idle ?u", "a bracket of a need is not closed"),
     ],
 )
-def test_mistake_is_told_with_the_authors_line(makes: str, needs: str, told: str) -> None:
+def test_mistake_is_told_with_the_authors_line(
+    makes: str, needs: str, situation: str, golden: Golden
+) -> None:
     @behaviour("(blink ?u - light)", makes=makes, needs=needs)
     async def wrong(ctx: Context, u: str) -> None: ...
 
     (problem,) = wrongs(plugin(wrong, unit="light"))
-    assert problem.startswith("ACTION_EFFECT")
-    assert f"test_action_fragment.py:{wrong.__code__.co_firstlineno} behaviour 'blink'" in problem
-    assert told in problem
+    assert problem.code == "ACTION_EFFECT"
+    place = f"test_action_fragment.py:{wrong.__code__.co_firstlineno} behaviour 'blink'"
+    assert problem.where.endswith(place)
+    golden.check(situation, words(problem))
 
 
 @pytest.mark.parametrize(
-    ("signature", "told"),
+    ("signature", "situation"),
     [
-        ("(blink ?u - host)", "?u is not a unit"),
-        ("(blink ?u - light ?c - colour)", "type 'colour' is not declared"),
-        ("(shine ?u - light)", "action 'shine' is declared already"),
+        ("(blink ?u - host)", "an action of no unit"),
+        ("(blink ?u - light ?c - colour)", "a parameter of an unknown type"),
+        ("(shine ?u - light)", "an action that a fragment declares"),
     ],
 )
-def test_action_that_cannot_be_declared_is_told(signature: str, told: str) -> None:
+def test_action_that_cannot_be_declared_is_told(
+    signature: str, situation: str, golden: Golden
+) -> None:
     names = ["ctx", *(part[0] for part in signature.split("?")[1:])]
     wrong: dict[str, Any] = {}
     exec(f"async def wrong({', '.join(names)}): ...", wrong)
     marked = behaviour(signature, makes="(lit ?u)")(wrong["wrong"])
     pddl = "(:action shine :parameters (?u - light) :effect (and))"
     (problem,) = wrongs(plugin(marked, pddl=pddl))
-    assert problem.startswith("ACTION_EFFECT") and told in problem
+    assert problem.code == "ACTION_EFFECT"
+    golden.check(situation, words(problem))
 
 
-def test_all_mistakes_are_told_at_once() -> None:
+def test_all_mistakes_are_told_at_once(golden: Golden) -> None:
     @behaviour("(one ?u - light)", makes="(lit ?x)")
     async def one(ctx: Context, u: str) -> None: ...
 
@@ -285,12 +297,8 @@ def test_all_mistakes_are_told_at_once() -> None:
     @behaviour("six")
     async def six(ctx: Context, u: str) -> None: ...
 
-    told = "\n".join(wrongs(plugin(one, two, three, four, six, unit="light")))
-    assert "ACTION_EFFECT" in told and "?x is no parameter" in told
-    assert "two takes (ctx, u), but its action has (ctx, u, h)" in told
-    assert "cannot read the action '(three u - light)'" in told
-    assert "its action is '(five ?u - light)', and its name is a signature, too" in told
-    assert "cannot read the action ''" in told
+    found = wrongs(plugin(one, two, three, four, six, unit="light"))
+    golden.check("five mistakes at once", "\n".join(words(problem) for problem in found))
 
 
 def test_fragment_that_cannot_be_read_is_left_to_the_merge() -> None:

@@ -40,13 +40,13 @@ def test_text_that_a_behaviour_returns_is_its_answer(bench: Bench) -> None:
 def test_own_failure_keeps_its_words(bench: Bench) -> None:
     call = bench.behave("greet", u="mouth", h="absent").assert_failed()
     assert call.problem is not None
-    assert call.problem.message == "no one is there"
+    assert call.problem.message == greeter.NO_ONE
 
 
 def test_other_errors_are_failures_with_a_place(bench: Bench) -> None:
     call = bench.behave("greet", u="mouth", h="error").assert_failed("BEHAVIOUR_RAISED")
     assert call.problem is not None
-    assert "ZeroDivisionError: a mistake of the author" in call.problem.message
+    assert "ZeroDivisionError" in call.problem.message
     assert "greeter.py:" in call.problem.where
 
 

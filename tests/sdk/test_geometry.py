@@ -101,7 +101,7 @@ def test_twist_is_the_same_motion_elsewhere(frames: FrameTree) -> None:
 
 
 def test_frame_without_a_way_is_unknown(frames: FrameTree) -> None:
-    with pytest.raises(FrameUnknown, match="no way is known from frame 'camera' to 'moon'"):
+    with pytest.raises(FrameUnknown, match=r"'camera' .*'moon'"):
         frames.transform(Bearing(Header(frame_id="camera"), (1.0, 0.0, 0.0), 0.1), "moon")
 
 

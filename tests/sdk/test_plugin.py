@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from tests.kit.golden import Golden
 from tests.sdk import greeter
 
 from nondum.sdk import (
@@ -101,7 +103,7 @@ def problems_of(plugin: object) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def test_everything_wrong_is_told_at_once() -> None:
+def test_everything_wrong_is_told_at_once(golden: Golden) -> None:
     @behaviour("swapped", action="(swapped ?u - base ?h - host)")
     async def swapped(ctx: Context, h: str, u: str) -> None: ...
 
@@ -121,15 +123,11 @@ def test_everything_wrong_is_told_at_once() -> None:
         module(swapped=swapped, unreadable=unreadable, ticked=NoInitialise, units=units)
     )
     assert len(told) == 6
-    text = "\n".join(told)
-    assert "swapped takes (ctx, h, u), but its action has (ctx, u, h)" in text
     line = swapped.__code__.co_firstlineno
     assert any(f"test_plugin.py:{line} behaviour 'swapped'" in one for one in told)
-    assert "NoInitialise takes (ctx), but its action has (ctx, u)" in text
-    assert "behaviour 'unreadable': cannot read the action" in text
-    assert "two of the units are called 'a'" in text
-    assert "two of the output slots are called 'o'" in text
-    assert "'Big__Name' is no name of a unit" in text
+    golden.check(
+        "six mistakes at once", "\n".join(re.sub(r"\S+\.py:\d+", "LINE", one) for one in told)
+    )
 
 
 def raising() -> None:
@@ -166,14 +164,15 @@ def test_unknown_hook_is_a_mistake() -> None:
     assert caught.value.code == "HOOK_UNKNOWN"
 
 
-def test_two_behaviours_of_one_name_are_refused() -> None:
+def test_two_behaviours_of_one_name_are_refused(golden: Golden) -> None:
     def make() -> Any:
         @behaviour("same", action="(same ?u - base)")
         async def same(ctx: Context, u: str) -> None: ...
 
         return same
 
-    assert "two behaviours are called 'same'" in problems_of(module(a=make(), b=make()))[0]
+    told = problems_of(module(a=make(), b=make()))[0]
+    golden.check("two behaviours of one name", re.sub(r"\S+\.py:\d+", "LINE", told))
 
 
 @pytest.mark.parametrize(
@@ -217,6 +216,6 @@ def test_class_that_cannot_be_made_is_told() -> None:
     class Needy:
         def __init__(self, what: str) -> None: ...
 
-    with pytest.raises(WorkerFailed, match="missing 1 required positional argument") as caught:
+    with pytest.raises(WorkerFailed, match=r"TypeError.*'what'") as caught:
         load(Needy)
     assert caught.value.code == "IMPORT_FAILED"

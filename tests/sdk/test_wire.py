@@ -55,6 +55,38 @@ messages: st.SearchStrategy[WireMessage] = st.one_of(
 )
 
 
+SAID = Problem("CODE", "what happened", where="there", need="n", have="h", fix="f")
+
+
+@pytest.mark.parametrize(
+    ("message", "packet"),
+    [
+        (Hello((2, 1), "0.1", 7), b"\x94\x00\x92\x02\x01\xa30.1\x07"),
+        (Welcome(1, {"host": "rover"}), b"\x93\x01\x01\x81\xa4host\xa5rover"),
+        (
+            Request(3, "behave", {"a": [1, None, True]}),
+            b"\x94\x02\x03\xa6behave\x81\xa1a\x93\x01\xc0\xc3",
+        ),
+        (Reply(3, {"b": b"\x01"}), b"\x93\x03\x03\x81\xa1b\xc4\x01\x01"),
+        (
+            Failure(3, (SAID, Problem("CODE", "m"))),
+            b"\x93\x04\x03\x92\x86\xa4code\xa4CODE\xa7message\xadwhat happened\xa5where\xa5there"
+            b"\xa4need\xa1n\xa4have\xa1h\xa3fix\xa1f\x82\xa4code\xa4CODE\xa7message\xa1m",
+        ),
+        (Event("flow", None, {}), b"\x94\x05\xa4flow\xc0\x80"),
+        (
+            Event("progress", 3, {"x": 0.5}),
+            b"\x94\x05\xa8progress\x03\x81\xa1x\xcb?\xe0\x00\x00\x00\x00\x00\x00",
+        ),
+        (Cancel(MAX_ID), b"\x92\x06\xcf\x00 \x00\x00\x00\x00\x00\x00"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_bytes_are_those_that_other_versions_read(message: WireMessage, packet: bytes) -> None:
+    assert encode(message) == packet
+    assert decode(packet) == message
+
+
 @given(messages)
 def test_every_message_survives(message: WireMessage) -> None:
     try:

@@ -228,7 +228,7 @@ async def test_flood_of_logs_breaks_nothing(worker: Start) -> None:
 
 async def test_hook_that_raises_is_told(worker: Start) -> None:
     one = await (await worker(STUBBORN)).ready()
-    with pytest.raises(WorkerFailed, match="hook 'translate_goal' raised KeyError") as caught:
+    with pytest.raises(WorkerFailed, match=r"'translate_goal' .*KeyError") as caught:
         await one.link.request("translate_goal", {"words": "fly"})
     assert caught.value.code == "HOOK_FAILED"
 
@@ -239,7 +239,7 @@ async def test_import_error_is_told_with_its_place(worker: Start, tmp_path: Path
     with pytest.raises(WorkerFailed) as caught:
         await one.link.request("describe", {})
     assert caught.value.code == "IMPORT_FAILED"
-    assert "No module named 'tests.sdk.no_such_module'" in str(caught.value)
+    assert "'tests.sdk.no_such_module'" in str(caught.value)
 
 
 async def test_unknown_version_ends_the_worker(worker: Start) -> None:

@@ -170,3 +170,23 @@ def test_everything_wrong_is_told_with_its_line() -> None:
         ("CONTENTS_HEADER", "CONTENTS:4"),
         ("PATH_UNSAFE", "CONTENTS:9"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("data", "code"),
+    [
+        (b"\xff" * 300_000, "CONTENTS_ENCODING"),
+        (b"nondum-payload", "SCHEMA_VERSION"),
+        (b"", "SCHEMA_VERSION"),
+    ],
+)
+def test_what_is_no_list_is_told_by_its_first_bytes(data: bytes, code: str) -> None:
+    flaw = contents.begins_wrong(data, "CONTENTS")
+    assert flaw is not None
+    assert (flaw.code, flaw.where) == (code, "CONTENTS")
+    assert flaw.fix
+
+
+@pytest.mark.parametrize("data", [PLAIN.encode(), b"nondum-payload 2\n", b"nondum-payload \xff"])
+def test_what_may_be_a_list_is_left_to_its_parser(data: bytes) -> None:
+    assert contents.begins_wrong(data, "CONTENTS") is None

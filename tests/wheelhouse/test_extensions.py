@@ -30,7 +30,7 @@ def judged(tmp_path: Path, held: dict[str, bytes], *tags: str) -> tuple[Problem,
 def test_refusal_tells_both_machines(tmp_path: Path) -> None:
     (problem,) = judged(tmp_path, {MODULE: elf(ARM)})
     assert problem.code == "WHEEL_MACHINE"
-    assert problem.message == f"{MODULE!r} is machine code for another processor"
+    assert repr(MODULE) in problem.message
     assert (problem.need, problem.have) == ("x86_64", "aarch64, 64 bits")
     assert problem.where == "evil-1.0-cp311-cp311-manylinux_2_28_x86_64.whl"
     assert problem.fix

@@ -55,7 +55,7 @@ def test_bytes_behind_the_stream_are_refused(library: Any, tail: bytes) -> None:
 @either_library
 def test_no_more_is_fed_behind_the_stream(library: Any) -> None:
     packed = memoryview(deflated(b"some") + bytes(MEGABYTE))
-    with pytest.raises(ValueError, match="bytes follow the packed ones"):
+    with pytest.raises(ValueError, match=r"\bbytes\b"):
         list(inflated(pieces(packed, 0, len(packed)), library))
 
 

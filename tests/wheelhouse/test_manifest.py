@@ -232,7 +232,7 @@ def test_a_mistake_is_told_where_it_is(code: str, line: str, text: str) -> None:
 
 def test_an_unknown_key_gets_the_nearest_known() -> None:
     (problem,) = problems(PLAIN.replace("summary", "sumary"))
-    assert problem.fix == "did you mean 'summary'?"
+    assert "'summary'" in problem.fix
 
 
 def test_everything_wrong_is_told_at_once() -> None:

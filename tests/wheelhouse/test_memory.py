@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit.golden import Golden
 
 from nondum.wheelhouse.format.manifest import Requires
 from nondum.wheelhouse.payload import memory
@@ -22,37 +23,31 @@ def told(needs: Requires, have: Memory) -> list[str]:
     return [str(problem) for problem in memory.problems(needs, have, "org.example.x")]
 
 
-def test_memory_reserved_for_other_components_is_reported_with_a_fix() -> None:
+def test_memory_reserved_for_other_components_is_reported_with_a_fix(golden: Golden) -> None:
     needs = Requires(memory_mb=600, gpu_memory_mb=600)
     have = Memory(1000, Gpu(1000, 1000), Promised(700, 500, 450, ("a",), ("a", "b")))
     short, gpu_short = memory.problems(needs, have, "org.example.x")
     assert (short.code, short.need, short.have) == ("NO_MEMORY", "600 MB", "500 MB")
-    assert short.message == ("there is too little memory, since 500 MB are promised to a")
-    assert short.fix == "pull or uninstall it, or use another host"
-    assert gpu_short.fix == "pull or uninstall one of them, or use another host"
+    golden.check("memory is promised to one", f"{short.message} → {short.fix}")
     assert (gpu_short.code, gpu_short.need, gpu_short.have) == (
         "NO_GPU_MEMORY",
         "600 MB",
         "550 MB",
     )
-    assert gpu_short.message == (
-        "there is too little GPU memory, since 450 MB are promised to a, b"
-    )
+    golden.check("GPU memory is promised to two", f"{gpu_short.message} → {gpu_short.fix}")
 
 
-def test_of_many_who_hold_it_some_are_told() -> None:
+def test_of_many_who_hold_it_some_are_told(golden: Golden) -> None:
     have = Memory(1000, promised=Promised(900, 900, holders=tuple("abcde")))
     (short,) = memory.problems(Requires(memory_mb=600), have, "org.example.x")
-    assert short.message.endswith("since 900 MB are promised to a, b, c …")
+    golden.check("memory is promised to many", short.message)
 
 
-def test_fix_names_no_components_where_none_holds_memory() -> None:
+def test_fix_names_no_components_where_none_holds_memory(golden: Golden) -> None:
     needs = Requires(memory_mb=2000, gpu_memory_mb=1)
     short, gpu_short = memory.problems(needs, Memory(1000), "org.example.x")
-    assert short.message == "there is too little memory"
-    assert short.fix == "free some memory, or use another host"
-    assert gpu_short.message == "there is too little GPU memory"
-    assert gpu_short.fix == "free some GPU memory, or use another host"
+    golden.check("memory is short", f"{short.message} → {short.fix}")
+    golden.check("GPU memory is short", f"{gpu_short.message} → {gpu_short.fix}")
 
 
 def test_memory_in_use_is_not_counted_twice() -> None:

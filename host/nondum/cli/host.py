@@ -14,7 +14,7 @@ from nondum.cli import render
 from nondum.cli.config import asked_options
 from nondum.cli.connection import Session, json_option
 from nondum.host.config.effective import Asked, effective
-from nondum.host.core.records import Safety
+from nondum.host.core.records.safety import Safety
 from nondum.host.service.notify import Notifier
 
 LONGEST_IMPORT_S = 300.0

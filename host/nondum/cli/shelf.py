@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from nondum.host.core.records import DeviceRecord
+from nondum.host.core.records.device import DeviceRecord
 from nondum.host.mind.composition import component_facts
 from nondum.host.sources.devices.matching import serving
 from nondum.planning.explain.advise import Candidate

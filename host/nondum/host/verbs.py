@@ -1,20 +1,19 @@
-"""The verbs of the control socket: questions and orders by name."""
+"""The verbs of the control socket: questions and orders of all kinds, by name."""
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from nondum.host.control.arguments import Arguments
-from nondum.host.control.orders import Orders
-from nondum.host.control.questions import Questions
 from nondum.host.control.server import Follow, Verb
-from nondum.host.control.trust_orders import TrustOrders
 from nondum.host.core.plain import Row
 from nondum.sdk.errors import ConfigRefused, Problem
 
 if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay
     from nondum.host.peers.peer_services import PeerServices
+
+T = TypeVar("T")
 
 PEER_VERBS = (
     "peers",
@@ -33,66 +32,39 @@ PEER_VERBS = (
 """What a host without peers refuses to answer, and why."""
 
 
-def answering(
-    questions: Questions, orders: Orders, trust: TrustOrders, neighbours: PeerServices | None
-) -> dict[str, Verb]:
+class Answers(Protocol):
+    """Questions or orders of one kind."""
+
+    def answering(self) -> Mapping[str, Callable[[Arguments], Awaitable[Any]]]:
+        """Their verbs that answer once."""
+        ...
+
+
+class Follows(Protocol):
+    """The same, where some of them go on answering."""
+
+    def following(self) -> Mapping[str, Callable[[Arguments], AsyncIterator[Any]]]:
+        """Their verbs that go on answering."""
+        ...
+
+
+def answering(*parts: Answers, peers: PeerServices | None) -> dict[str, Verb]:
     """Verbs that answer once."""
-    verbs: dict[str, Callable[[Arguments], Awaitable[Any]]] = {
-        "behaviours": questions.behaviours,
-        "components": questions.components,
-        "connect": orders.connect,
-        "composition": questions.composition,
-        "device_slots": questions.device_slots,
-        "devices": questions.devices,
-        "devices_why": questions.devices_why,
-        "fact": questions.fact,
-        "facts": questions.facts,
-        "forget": orders.forget,
-        "goal": orders.goal,
-        "goals": questions.goals,
-        "halt": orders.halt,
-        "inputs": questions.inputs,
-        "journal": questions.journal,
-        "known_devices": questions.known_devices,
-        "leave_safe_mode": orders.leave_safe_mode,
-        "logs": questions.logs,
-        "mount": orders.mount,
-        "names": questions.names,
-        "plan": questions.plan,
-        "resume": orders.resume,
-        "retry": orders.retry,
-        "say": orders.say,
-        "status": questions.status,
-        "store": questions.store,
-        "streams": questions.streams,
-        "tap": orders.tap,
-        "tree": questions.tree,
-        "uninstall": orders.uninstall,
-        "units": questions.units,
-        "why": questions.why,
-        **trust.answering(),
-    }
-    verbs |= neighbours.answering() if neighbours else dict.fromkeys(PEER_VERBS, _no_peers)
+    verbs = _together(part.answering() for part in parts)
+    verbs |= peers.answering() if peers else dict.fromkeys(PEER_VERBS, _no_peers)
     return {name: _parsing(verb) for name, verb in verbs.items()}
 
 
-def following(
-    questions: Questions, orders: Orders, neighbours: PeerServices | None
-) -> dict[str, Follow]:
+def following(*parts: Follows, peers: PeerServices | None) -> dict[str, Follow]:
     """Verbs that go on answering."""
-    verbs: dict[str, Callable[[Arguments], AsyncIterator[Any]]] = {
-        "follow_facts": questions.follow_facts,
-        "follow_goal": questions.follow_goal,
-        "follow_goals": questions.follow_goals,
-        "follow_journal": questions.follow_journal,
-        "follow_logs": questions.follow_logs,
-        "follow_tree": questions.follow_tree,
-        "install": orders.install,
-        "rollback": orders.rollback,
-        "watch": questions.watch,
-    }
-    verbs |= neighbours.following() if neighbours else {"peers_pair": _no_peers_to_follow}
+    verbs = _together(part.following() for part in parts)
+    verbs |= peers.following() if peers else {"peers_pair": _no_peers_to_follow}
     return {name: _parsing(verb) for name, verb in verbs.items()}
+
+
+def _together(tables: Iterable[Mapping[str, T]]) -> dict[str, T]:
+    """One table of all."""
+    return {name: verb for table in tables for name, verb in table.items()}
 
 
 async def _no_peers(arguments: Arguments) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import socket
 from datetime import timedelta
 from pathlib import Path
@@ -13,7 +15,8 @@ from nondum.cli.examination import account, beliefs, clock, daemon, drives, mach
 from nondum.cli.examination.examination import examine
 from nondum.cli.examination.finding import Finding, Result
 from nondum.host.config.effective import Asked
-from nondum.host.config.host_config import HostConfig, InstallSection, parse
+from nondum.host.config.host_config import HostConfig, InstallSection
+from nondum.host.config.parsing import parse
 from nondum.host.sources.drives.disk_report import Disk, Owner
 from nondum.wheelhouse.trust.judging import EARLIEST
 
@@ -121,7 +124,7 @@ def test_disk_and_folder_of_the_configuration_are_looked_at(tmp_path: Path) -> N
 
 def test_helper_that_listens_is_reached(tmp_path: Path) -> None:
     path = tmp_path / "helper.sock"
-    assert "No such file" in daemon._reached(path)
+    assert os.strerror(errno.ENOENT) in daemon._reached(path)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind(str(path))
         listener.listen()

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from demo.search.sites import Lan, Loopback, site
 
-from nondum.host.config.host_config import HostConfig, PeersSection, parse
+from nondum.host.config.host_config import HostConfig, PeersSection
+from nondum.host.config.parsing import parse
 
 NAMES = ("rover", "mule", "scout")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.fuzz.target import Target, of_text
 from tests.fuzz.tokens import JSON, MSGPACK, TOML
 
-from nondum.host.config import host_config
+from nondum.host.config import host_config, parsing
 from nondum.host.control import protocol as control
 from nondum.sdk import wire
 from nondum.sdk.errors import Problem
@@ -49,7 +49,7 @@ listen = ["tcp://*:7410"]
 
 
 def _read_config(text: str) -> object:
-    return host_config.parse(text, WHERE, host_config.user_config())
+    return parsing.parse(text, WHERE, host_config.user_config())
 
 
 TARGETS = (

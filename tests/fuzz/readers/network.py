@@ -45,7 +45,7 @@ def _peer_messages() -> list[bytes]:
 
 
 def _pairing_messages() -> list[bytes]:
-    commit = pairing.Commit(KEY, "rover", bytes(pairing_messages.HASH_BYTES))
+    commit = pairing.Commit(KEY, "rover", bytes(pairing.HASH_BYTES))
     said = (
         pairing.Ask(KEY, "rover"),
         commit,

@@ -19,25 +19,21 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead
 from nondum.host.catalogue.rows import as_json
-from nondum.host.core.records import (
-    ComponentRecord,
-    ComponentState,
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.device import (
     DeviceClaim,
     DeviceInterface,
     DeviceNode,
     DeviceRecord,
-    DriveRecord,
-    DriveState,
-    FormerPayload,
-    GoalRecord,
-    JournalEntry,
     KnownDevice,
-    Moment,
-    MountPose,
-    PayloadRecord,
-    Rollback,
-    Step,
 )
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.payload import FormerPayload, PayloadRecord, Rollback
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import Highwater, HostState
 from nondum.planning.merge.given_names import GivenNames
 from nondum.sdk.description import (

@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.descriptors import descriptors_left
+from tests.kit.golden import Golden
 from tests.kit.until import arrived, until_async
 
 from nondum.host.control import protocol
@@ -44,8 +45,11 @@ async def echo(arguments: Mapping[str, Any]) -> Any:
     return dict(arguments)
 
 
+REFUSAL = Problem("GOAL_UNKNOWN_WORDS", "no such goal", fix="see `nondum goals`")
+
+
 async def refuse(arguments: Mapping[str, Any]) -> Any:
-    raise GoalRefused(Problem("GOAL_UNKNOWN_WORDS", "no such goal", fix="see `nondum goals`"))
+    raise GoalRefused(REFUSAL)
 
 
 async def crash(arguments: Mapping[str, Any]) -> Any:
@@ -165,7 +169,7 @@ async def test_a_refusal_keeps_its_words(tmp_path: Path) -> None:
     async with serving(tmp_path / "control.sock"):
         with pytest.raises(GoalRefused) as refused:
             await asyncio.to_thread(ask, tmp_path / "control.sock", "refuse")
-    assert str(refused.value) == "GOAL_UNKNOWN_WORDS no such goal → see `nondum goals`"
+    assert refused.value.problems == (REFUSAL,)
 
 
 async def test_a_connection_comes_with_an_answer_and_the_next_question_is_answered(
@@ -217,15 +221,17 @@ async def test_a_daemon_that_goes_before_a_connection_came_is_told(tmp_path: Pat
 
 async def test_an_unknown_verb_names_the_nearest(tmp_path: Path) -> None:
     async with serving(tmp_path / "control.sock"):
-        with pytest.raises(NondumError, match="did you mean 'echo'"):
+        with pytest.raises(NondumError) as unknown:
             await asyncio.to_thread(ask, tmp_path / "control.sock", "ecoh")
+    assert "'echo'" in unknown.value.problems[0].fix
 
 
 async def test_a_fault_of_the_daemon_is_told_and_survived(tmp_path: Path) -> None:
     path = tmp_path / "control.sock"
     async with serving(path):
-        with pytest.raises(NondumError, match="INTERNAL daemon: RuntimeError"):
+        with pytest.raises(NondumError, match="RuntimeError") as crashed:
             await asyncio.to_thread(ask, path, "crash")
+        assert (crashed.value.code, crashed.value.problems[0].where) == ("INTERNAL", "daemon")
         assert await asyncio.to_thread(ask, path, "echo") == {}
 
 
@@ -352,9 +358,11 @@ async def test_only_owner_and_group_may_open_it(tmp_path: Path) -> None:
         assert stat.S_IMODE((tmp_path / "control.sock").stat().st_mode) == 0o660
 
 
-def test_no_daemon_is_told_with_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(HostUnreachable, match="nondum host run --user"):
+def test_no_daemon_is_told_with_the_remedy(tmp_path: Path, golden: Golden) -> None:
+    with pytest.raises(HostUnreachable) as unreachable:
         ControlClient(tmp_path / "missing.sock")
+    (problem,) = unreachable.value.problems
+    golden.check("no daemon answers", problem.fix)
 
 
 @given(st.text(), st.dictionaries(st.text(), JSON))

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from nondum.host.control.news import News, Progress
-from nondum.host.core.events import DriveRemoved, FactForgotten, PayloadCopied, ProgressMade
+from nondum.host.core.events.drives import DriveRemoved
+from nondum.host.core.events.facts import FactForgotten
+from nondum.host.core.events.payloads import PayloadCopied, ProgressMade
 
 pytestmark = pytest.mark.anyio
 

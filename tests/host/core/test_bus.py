@@ -7,7 +7,9 @@ import logging
 import pytest
 
 from nondum.host.core.bus import Bus
-from nondum.host.core.events import DriveRemoved, Event, PlanMissing
+from nondum.host.core.events.drives import DriveRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.goals import PlanMissing
 from nondum.host.lifecycle.advance import RULES
 
 pytestmark = pytest.mark.anyio
@@ -24,9 +26,9 @@ async def test_error_of_a_listener_affects_no_other_one(caplog: pytest.LogCaptur
     with caplog.at_level(logging.ERROR):
         bus.emit(PlanMissing("1", ()))
     assert heard == [PlanMissing("1", ())]
-    assert [record.message for record in caplog.records] == [
-        f"a listener raised an error at {heard[0].name}"
-    ]
+    [record] = caplog.records
+    assert record.levelno == logging.ERROR
+    assert heard[0].name in record.message
 
 
 async def test_what_changes_the_catalogue_waits_for_its_commit() -> None:

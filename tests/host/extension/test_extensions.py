@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 from importlib_metadata import EntryPoint
 
-from nondum.host.config.host_config import HostConfig, parse
-from nondum.host.core.records import Snapshot
+from nondum.host.config.host_config import HostConfig
+from nondum.host.config.parsing import parse
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.extension import hookspecs
 from nondum.host.extension.hookspecs import Host, hookimpl
 from nondum.host.extension.loading import DEFAULT_PLUGINS, Extensions

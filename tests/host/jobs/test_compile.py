@@ -12,8 +12,9 @@ from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 from tests.kit.until import arrived
 
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.payloads import WheelsCompiled
+from nondum.host.core.events.workers import WorkerLogged
+from nondum.host.core.records.step import Step
 from nondum.host.manager.installation import InstallOptions
 from nondum.host.sources.inotify import folders_watched
 from nondum.wheelhouse.store import bytecode
@@ -43,7 +44,7 @@ def lamp(drive: Path, *, id: str = "lamp", payload_id: str = LAMP_ID, **files: s
 
 
 def said(host: HostInProcess) -> list[str]:
-    lines = (event.message for event in host.heard if isinstance(event, events.WorkerLogged))
+    lines = (event.message for event in host.heard if isinstance(event, WorkerLogged))
     return [line for line in lines if line.startswith("from ")]
 
 
@@ -120,7 +121,7 @@ async def test_a_failure_hurts_no_payload(tmp_path: Path) -> None:
         shutil.rmtree(entry(host).folder)  # so that it cannot be compiled
         host.plug(tmp_path / "other", "b")
         await host.until_compiled("org.example.torch")
-        assert len([e for e in host.heard if isinstance(e, events.WheelsCompiled)]) == 1
+        assert len([e for e in host.heard if isinstance(e, WheelsCompiled)]) == 1
         for id in ("lamp", "torch"):
             component = host.snapshot.component(id)
             assert component is not None
@@ -147,7 +148,7 @@ async def test_a_withdrawn_payload_is_not_compiled(tmp_path: Path) -> None:
         await host.until_gone(LAMP_ID)
         assert not left_over(host.folders)
         assert store(host).verify(entry(host).sha256) == ()
-        assert not any(isinstance(event, events.WheelsCompiled) for event in host.heard)
+        assert not any(isinstance(event, WheelsCompiled) for event in host.heard)
 
 
 async def test_what_pip_installed_is_left_as_it_is(tmp_path: Path) -> None:

@@ -7,8 +7,10 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from random import Random
 from typing import Any
 
+import pytest
 from tests.kit.lamp_drive import PAYLOAD, code, lamp, told
 from tests.kit.payloads import seal
 from tests.kit.signing import Key, sign_payload, trust_of
@@ -100,11 +102,40 @@ def test_version_without_end_takes_no_other_payload_of_the_drive_along(tmp_path:
 
 def test_unsigned_payload_is_neither_parsed_nor_copied(tmp_path: Path) -> None:
     folder = lamp(tmp_path / "drive")
-    (folder / "CONTENTS").write_bytes(b"\xff")
+    (folder / "CONTENTS").write_bytes(b"nondum-payload 1\n\xff")
     assert found_on(tmp_path / "drive", allow_unsigned=False) == ["SIG_MISSING"]
     assert found_on(tmp_path / "drive") == ["CONTENTS_ENCODING"]
     assert code(copy, folder, tmp_path, allow_unsigned=False) == "SIG_MISSING"
     assert not (tmp_path / "staging").exists()
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        pytest.param(Random(1).randbytes(2_000), "CONTENTS_ENCODING", id="random bytes"),
+        pytest.param(b"all my photographs\n", "SCHEMA_VERSION", id="another text"),
+        pytest.param(b"", "SCHEMA_VERSION", id="empty"),
+    ],
+)
+def test_what_is_no_list_is_told_beside_the_missing_signature(
+    tmp_path: Path, data: bytes, expected: str
+) -> None:
+    """Signing it would not help; to sign it is all that the other problem advises."""
+    folder = lamp(tmp_path / "drive")
+    (folder / "CONTENTS").write_bytes(data)
+    assert found_on(tmp_path / "drive", allow_unsigned=False) == ["SIG_MISSING", expected]
+    assert found_on(tmp_path / "drive") == [expected]
+    (folder / "CONTENTS.sig").write_text("signed")
+    signed = found_on(tmp_path / "drive", allow_unsigned=False)
+    assert signed == ["SIG_MALFORMED"], "what came with signatures is judged by these alone"
+
+
+def test_words_of_an_unsigned_drive_are_not_told(tmp_path: Path) -> None:
+    (lamp(tmp_path / "drive") / "CONTENTS").write_bytes(b"run away, says the robot\n")
+    given = {"root": str(tmp_path / "drive"), "node": None, "kind": "slot"}
+    found = look.look(given | {"allow_unsigned": False}, told)["payloads"]
+    assert len(found[0]["problems"]) == 2
+    assert "run away" not in str(found)
 
 
 def test_list_that_is_another_by_now_is_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from tests.kit.host import LAMP
 from tests.kit.payloads import Part, make_payload, make_wheel, manifest_text, seal
 
-from nondum.host.core.records import Step
+from nondum.host.core.records.step import Step
 from nondum.sdk.description import PluginDescription
 
 BAD = "org.example.bad"

@@ -5,17 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from nondum.host.core import events
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import Event
-from nondum.host.core.records import (
-    ComponentRecord,
-    ComponentState,
-    DeviceClaim,
-    Moment,
-    MountPose,
-    Step,
+from nondum.host.core.events.drives import DriveInserted, DriveRead
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    ComponentsProbed,
+    PayloadActivated,
+    PayloadCopied,
+    PayloadFailed,
+    PayloadFound,
+    PayloadRefused,
+    PayloadStaged,
+    PayloadVerified,
+    PayloadWithdrawn,
+    WheelsStored,
 )
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.device import DeviceClaim
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.sdk.description import Fragment, PluginDescription
@@ -26,15 +35,15 @@ PROBLEM = Problem("TEST", "made up")
 OLDER = Problem("ROLLBACK", "made up")
 
 
-def drive(name: str = "a", kind: str = "slot") -> events.DriveInserted:
-    return events.DriveInserted(name, Path("/drives") / name, kind)
+def drive(name: str = "a", kind: str = "slot") -> DriveInserted:
+    return DriveInserted(name, Path("/drives") / name, kind)
 
 
 def found(
     key: str = "k1", drive: str = "a", *, payload_id: str = "org.x", release: int = 1
-) -> events.PayloadFound:
+) -> PayloadFound:
     folder = Path("/drives") / drive / "nondum" / payload_id
-    return events.PayloadFound(key, drive, folder, f"digest-{key}", payload_id, "1.0", release)
+    return PayloadFound(key, drive, folder, f"digest-{key}", payload_id, "1.0", release)
 
 
 def component(
@@ -77,12 +86,12 @@ def way_to_active(
     mounts = (MountPose(f"spot__{id}__camera", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "payload"),)
     return [
         found(key, drive, payload_id=payload_id),
-        events.PayloadCopied(key),
-        events.PayloadVerified(key, (id,)),
-        events.PayloadStaged(key),
-        events.WheelsStored(key, 1),
-        events.ComponentsProbed(key),
-        events.PayloadActivated(key, (component(id, key, need, words, called),), mounts),
+        PayloadCopied(key),
+        PayloadVerified(key, (id,)),
+        PayloadStaged(key),
+        WheelsStored(key, 1),
+        ComponentsProbed(key),
+        PayloadActivated(key, (component(id, key, need, words, called),), mounts),
     ]
 
 
@@ -97,7 +106,7 @@ def after(*happened: Event, state: HostState | None = None) -> tuple[HostState, 
 
 
 def active(id: str = "eye", need: str = "") -> HostState:
-    return after(drive(), *way_to_active(id=id, need=need), events.DriveRead("a", ("k1",)))[0]
+    return after(drive(), *way_to_active(id=id, need=need), DriveRead("a", ("k1",)))[0]
 
 
 def at_step(step: Step) -> HostState:
@@ -108,13 +117,13 @@ def at_step(step: Step) -> HostState:
         case Step.GONE:
             return after(drive())[0]
         case Step.REMOVING:
-            return after(drive(), *way, events.PayloadWithdrawn("k1", "test"))[0]
+            return after(drive(), *way, PayloadWithdrawn("k1", "test"))[0]
         case Step.SUPERSEDED:
             return after(drive("b"), *upgrade(), state=after(drive(), *way)[0])[0]
         case Step.REFUSED:
-            return after(drive(), way[0], events.PayloadRefused("k1", (OLDER,)))[0]
+            return after(drive(), way[0], PayloadRefused("k1", (OLDER,)))[0]
         case Step.QUARANTINED:
-            return after(drive(), *way[:5], events.PayloadFailed("k1", (PROBLEM,)))[0]
+            return after(drive(), *way[:5], PayloadFailed("k1", (PROBLEM,)))[0]
         case _:
             return after(drive(), *way[: order.index(step) + 1])[0]
 

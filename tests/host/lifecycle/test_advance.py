@@ -20,9 +20,34 @@ from tests.host.lifecycle.states import (
 )
 from tests.host.sources.devices.sightings import appeared
 
-from nondum.host.core import effects, events
-from nondum.host.core.events import Event
-from nondum.host.core.records import ComponentState, DriveState, Step
+from nondum.host.core import effects
+from nondum.host.core.events.devices import DeviceRemoved
+from nondum.host.core.events.drives import DriveRead, DriveRemoved, DrivesScanned, DriveUnreadable
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.inputs import InputConnected
+from nondum.host.core.events.mounts import MountSet
+from nondum.host.core.events.payloads import (
+    PayloadCleared,
+    PayloadCopied,
+    PayloadFailed,
+    PayloadFound,
+    PayloadRefused,
+    PayloadWithdrawn,
+    RetryAsked,
+)
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.releases import PayloadResumed, PayloadSuperseded, RollbackAsked
+from nondum.host.core.events.trust import PayloadDistrusted
+from nondum.host.core.events.workers import (
+    ConditionEnded,
+    WorkerExited,
+    WorkerFailed,
+    WorkerReady,
+    WorkerStable,
+)
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS, HELD, RECOVERY, TRANSITIONS
 from nondum.host.lifecycle.advance import advance
@@ -35,16 +60,16 @@ EVENTS: dict[type[Event], Event] = {
     type(event): event
     for event in (
         *way_to_active(),
-        events.PayloadRefused("k1", (PROBLEM,)),
-        events.PayloadFailed("k1", (PROBLEM,)),
-        events.PayloadSentAway("k1", "mule", (PROBLEM,)),
-        events.PayloadDistrusted("k1", (PROBLEM,)),
-        events.PayloadWithdrawn("k1", "test"),
-        events.PayloadCleared("k1"),
-        events.PayloadSuperseded("k1", "k2", "test"),
-        events.PayloadResumed("k1", "test"),
-        events.RollbackAsked("k1", 1, 2),
-        events.RetryAsked("k1"),
+        PayloadRefused("k1", (PROBLEM,)),
+        PayloadFailed("k1", (PROBLEM,)),
+        PayloadSentAway("k1", "mule", (PROBLEM,)),
+        PayloadDistrusted("k1", (PROBLEM,)),
+        PayloadWithdrawn("k1", "test"),
+        PayloadCleared("k1"),
+        PayloadSuperseded("k1", "k2", "test"),
+        PayloadResumed("k1", "test"),
+        RollbackAsked("k1", 1, 2),
+        RetryAsked("k1"),
     )
 }
 
@@ -54,7 +79,7 @@ EVENTS: dict[type[Event], Event] = {
 )
 def test_each_row_leads_where_it_says(step: Step, kind: type[Event]) -> None:
     row = TRANSITIONS[step, kind]
-    state = with_newer(at_step(step)) if kind is events.PayloadSuperseded else at_step(step)
+    state = with_newer(at_step(step)) if kind is PayloadSuperseded else at_step(step)
     outcome = advance(state, EVENTS[kind], AT)
     payload = outcome.state.payloads.get("k1")
     assert (payload.step if payload else Step.GONE) is row.to
@@ -65,8 +90,8 @@ def test_each_row_leads_where_it_says(step: Step, kind: type[Event]) -> None:
 @pytest.mark.parametrize("step", Step)
 @pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
 def test_news_of_an_earlier_life_is_dropped(step: Step, kind: type[Event]) -> None:
-    asked = (events.RetryAsked, events.RollbackAsked)
-    if (step, kind) in TRANSITIONS or kind in (events.PayloadFound, *asked):
+    asked = (RetryAsked, RollbackAsked)
+    if (step, kind) in TRANSITIONS or kind in (PayloadFound, *asked):
         return
     state = at_step(step)
     outcome = advance(state, EVENTS[kind], AT)
@@ -97,7 +122,7 @@ def test_activation_enters_components_in_one_turn() -> None:
 
 
 def test_pulled_drive_withdraws_at_once() -> None:
-    state, done = after(events.DriveRemoved("a"), state=active())
+    state, done = after(DriveRemoved("a"), state=active())
     assert not state.components
     assert not state.mounts
     assert state.revision == 2
@@ -107,109 +132,109 @@ def test_pulled_drive_withdraws_at_once() -> None:
 
 def test_second_source_keeps_the_payload() -> None:
     both, _ = after(drive("b"), found(drive="b"), state=active())
-    state, done = after(events.DriveRemoved("a"), state=both)
+    state, done = after(DriveRemoved("a"), state=both)
     assert "eye" in state.components
     assert done == [effects.ReleaseDrive("a")]
 
 
 def test_copy_goes_on_from_the_other_drive() -> None:
     state, _ = after(drive("a"), drive("b"), found(), found(drive="b"))
-    _, done = after(events.DriveRemoved("a"), state=state)
+    _, done = after(DriveRemoved("a"), state=state)
     assert [e.drive for e in done if isinstance(e, effects.CopyPayload)] == ["b"]
 
 
 def test_replug_while_removing_reads_the_drive_again() -> None:
-    removing, _ = after(events.DriveRemoved("a"), drive("a"), found(), state=active())
-    state, done = after(events.PayloadCleared("k1"), state=removing)
+    removing, _ = after(DriveRemoved("a"), drive("a"), found(), state=active())
+    state, done = after(PayloadCleared("k1"), state=removing)
     assert not state.payloads
     assert done == [effects.ReadDrive("a", "slot", Path("/drives/a"))]
 
 
 def test_older_release_is_refused() -> None:
-    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    gone, _ = after(DriveRemoved("a"), PayloadCleared("k1"), state=active())
     state, done = after(drive(), found("k0", release=0), state=gone)
     assert [p.code for p in state.payloads["k0"].problems] == ["ROLLBACK"]
     assert not any(isinstance(effect, effects.CopyPayload) for effect in done)
 
 
 def test_same_release_with_other_content_is_refused() -> None:
-    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    gone, _ = after(DriveRemoved("a"), PayloadCleared("k1"), state=active())
     state, _ = after(drive(), found("k2"), state=gone)
     assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_CONFLICT"]
 
 
 def test_implausible_release_is_refused() -> None:
-    gone, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=active())
+    gone, _ = after(DriveRemoved("a"), PayloadCleared("k1"), state=active())
     state, _ = after(drive(), found("k2", release=2**53), state=gone)
     assert [p.code for p in state.payloads["k2"].problems] == ["RELEASE_JUMP"]
 
 
 def test_drive_is_released_when_all_is_copied() -> None:
-    reading, before = after(drive(), found(), events.DriveRead("a", ("k1",)))
+    reading, before = after(drive(), found(), DriveRead("a", ("k1",)))
     assert effects.ReleaseDrive("a") not in before
-    state, done = after(events.PayloadCopied("k1"), state=reading)
+    state, done = after(PayloadCopied("k1"), state=reading)
     assert effects.ReleaseDrive("a") in done
     assert state.drives["a"].state is DriveState.IDLE
 
 
 def test_drive_without_payload_says_so() -> None:
-    state, done = after(drive(), events.DriveRead("a", ()))
+    state, done = after(drive(), DriveRead("a", ()))
     assert [p.code for p in state.drives["a"].problems] == ["DRIVE_NOT_PAYLOAD"]
     assert effects.ReleaseDrive("a") in done
 
 
 def test_unreadable_drive_gives_up_what_was_being_copied() -> None:
-    state, done = after(drive(), found(), events.DriveUnreadable("a", (PROBLEM,)))
+    state, done = after(drive(), found(), DriveUnreadable("a", (PROBLEM,)))
     assert state.drives["a"].problems == (PROBLEM,)
     assert state.payloads["k1"].step is Step.REMOVING
     assert effects.ClearPayload("k1") in done
 
 
 def test_worker_that_restarts_is_not_ready_meanwhile() -> None:
-    state, _ = after(events.WorkerExited("eye", "signal 9"), state=active())
+    state, _ = after(WorkerExited("eye", "signal 9"), state=active())
     assert state.components["eye"].state is ComponentState.RESTARTING
     assert state.revision == 2
-    again = events.WorkerReady("eye", PluginDescription("eye", "1.0"))
+    again = WorkerReady("eye", PluginDescription("eye", "1.0"))
     assert after(again, state=state)[0].components["eye"].state is ComponentState.READY
 
 
 def test_why_a_worker_ended_stays_with_its_component_until_the_next_one_has_lasted() -> None:
-    ended = events.WorkerExited("eye", "it hung", problem=PROBLEM)
-    again = events.WorkerReady("eye", PluginDescription("eye", "1.0"))
+    ended = WorkerExited("eye", "it hung", problem=PROBLEM)
+    again = WorkerReady("eye", PluginDescription("eye", "1.0"))
     state, _ = after(ended, again, state=active())
     assert state.components["eye"].state is ComponentState.READY
     assert state.components["eye"].problems == (PROBLEM,)
-    state, _ = after(events.WorkerStable("eye"), state=state)
+    state, _ = after(WorkerStable("eye"), state=state)
     assert state.components["eye"].problems == ()
 
 
 def test_condition_that_has_ended_is_a_problem_of_its_component_while_its_worker_lives() -> None:
     dead = Problem("CONDITION_RAISED", "ValueError: x", where="sees of eye (eye.py:3)")
-    told = events.ConditionEnded("eye", "sees", (dead,), "k1")
+    told = ConditionEnded("eye", "sees", (dead,), "k1")
     state, _ = after(told, state=active())
     assert state.components["eye"].problems == (dead,)
     assert state.components["eye"].is_ready
     assert after(told, state=state) == (state, [])
-    assert after(events.WorkerStable("eye"), state=state) == (state, [])
-    state, _ = after(events.WorkerExited("eye", "signal 9"), state=state)
+    assert after(WorkerStable("eye"), state=state) == (state, [])
+    state, _ = after(WorkerExited("eye", "signal 9"), state=state)
     assert state.components["eye"].problems == ()
 
 
 def test_condition_of_another_release_is_no_news() -> None:
-    told = events.ConditionEnded("eye", "sees", (PROBLEM,), "k2")
+    told = ConditionEnded("eye", "sees", (PROBLEM,), "k2")
     assert after(told, state=active())[0] == active()
 
 
 def test_failed_worker_is_quarantined_until_told() -> None:
-    state, _ = after(events.WorkerFailed("eye", (PROBLEM,)), state=active())
+    state, _ = after(WorkerFailed("eye", (PROBLEM,)), state=active())
     assert state.components["eye"].problems == (PROBLEM,)
-    told, done = after(events.RetryAsked("k1"), state=state)
+    told, done = after(RetryAsked("k1"), state=state)
     assert done == [effects.RestartWorker("eye")]
     assert told.components["eye"].state is ComponentState.RESTARTING
 
 
 def test_worker_that_fails_before_activation_takes_its_payload_along() -> None:
-    state, _ = after(events.WorkerFailed("eye", (PROBLEM,)), state=at_step(Step.PROBED))
+    state, _ = after(WorkerFailed("eye", (PROBLEM,)), state=at_step(Step.PROBED))
     assert state.payloads["k1"].step is Step.QUARANTINED
     assert state.payloads["k1"].problems == (PROBLEM,)
 
@@ -222,7 +247,7 @@ def test_device_goes_to_who_needs_it() -> None:
     state, done = after(other, port, state=before)
     assert done == [effects.AttachDevice("eye", "port", state.devices["usb1"].nodes)]
     assert state.components["eye"].is_ready
-    state, done = after(events.DeviceRemoved("usb1"), state=state)
+    state, done = after(DeviceRemoved("usb1"), state=state)
     assert done == [effects.DetachDevice("eye", "port", "usb1")]
     assert not state.components["eye"].is_ready
 
@@ -239,23 +264,23 @@ def test_contested_device_stays_and_the_contest_is_told() -> None:
 
 def test_persons_mount_outlives_the_component() -> None:
     unit = "spot__eye__camera"
-    said = events.MountSet(unit, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    state, _ = after(said, events.DriveRemoved("a"), state=active())
+    said = MountSet(unit, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    state, _ = after(said, DriveRemoved("a"), state=active())
     assert state.mounts[unit].origin == "person"
 
 
 def test_what_a_person_connected_outlives_the_component() -> None:
     name = "eye.camera.odometry"
-    said = events.InputConnected(name, "spot__base__odometry")
-    state, _ = after(said, events.DriveRemoved("a"), state=active())
+    said = InputConnected(name, "spot__base__odometry")
+    state, _ = after(said, DriveRemoved("a"), state=active())
     assert state.connections == {name: "spot__base__odometry"}
-    state, _ = after(events.InputConnected(name, ""), state=state)
+    state, _ = after(InputConnected(name, ""), state=state)
     assert state.connections == {}
 
 
 def test_connecting_an_input_is_a_recomposition() -> None:
     before = active()
-    state, _ = after(events.InputConnected("eye.camera.odometry", "s"), state=before)
+    state, _ = after(InputConnected("eye.camera.odometry", "s"), state=before)
     assert state.revision == before.revision + 1
     assert state.snapshot().connections == (("eye.camera.odometry", "s"),)
 
@@ -277,14 +302,14 @@ def test_recovery_sends_back_or_forward(step: Step) -> None:
 
 def test_drive_that_left_while_the_daemon_was_down_is_withdrawn() -> None:
     recovered = recover(active(), AT).state
-    state, done = after(events.DrivesScanned("slot", ()), state=recovered)
+    state, done = after(DrivesScanned("slot", ()), state=recovered)
     assert state.payloads["k1"].step is Step.REMOVING
     assert effects.ClearPayload("k1", ("eye",)) in done
 
 
 def test_payload_swapped_while_the_daemon_was_down_is_withdrawn() -> None:
     recovered = recover(active(), AT).state
-    state, _ = after(drive(), events.DriveRead("a", ()), state=recovered)
+    state, _ = after(drive(), DriveRead("a", ()), state=recovered)
     assert state.payloads["k1"].step is Step.REMOVING
 
 
@@ -300,28 +325,24 @@ def test_payload_that_ends_the_daemon_is_quarantined() -> None:
 
 HAPPENINGS: list[Event] = [
     *(drive(name) for name in ("a", "b")),
-    *(events.DriveRemoved(name) for name in ("a", "b")),
-    *(events.DriveRead(name, keys) for name in ("a", "b") for keys in ((), ("k1",), ("k2",))),
-    events.DriveUnreadable("a", (PROBLEM,)),
-    events.DrivesScanned("slot", ("a",)),
+    *(DriveRemoved(name) for name in ("a", "b")),
+    *(DriveRead(name, keys) for name in ("a", "b") for keys in ((), ("k1",), ("k2",))),
+    DriveUnreadable("a", (PROBLEM,)),
+    DrivesScanned("slot", ("a",)),
     *way_to_active("k1", "a"),
     *way_to_active("k2", "b", "arm", "PTU", payload_id="org.y"),
     *way_to_active("k3", "b", "eye"),
-    *(
-        kind(key, (PROBLEM,))
-        for kind in (events.PayloadRefused, events.PayloadFailed)
-        for key in ("k1", "k2")
-    ),
-    *(events.PayloadCleared(key) for key in ("k1", "k2", "k3")),
-    *(events.RetryAsked(key) for key in ("k1", "k2", "k3")),
-    events.WorkerExited("eye", "test"),
-    events.WorkerExited("eye", "test", problem=PROBLEM),
-    events.WorkerStable("eye"),
-    events.ConditionEnded("eye", "sees", (PROBLEM,)),
-    events.WorkerFailed("arm", (PROBLEM,)),
-    events.WorkerReady("eye", PluginDescription("eye", "1.0")),
+    *(kind(key, (PROBLEM,)) for kind in (PayloadRefused, PayloadFailed) for key in ("k1", "k2")),
+    *(PayloadCleared(key) for key in ("k1", "k2", "k3")),
+    *(RetryAsked(key) for key in ("k1", "k2", "k3")),
+    WorkerExited("eye", "test"),
+    WorkerExited("eye", "test", problem=PROBLEM),
+    WorkerStable("eye"),
+    ConditionEnded("eye", "sees", (PROBLEM,)),
+    WorkerFailed("arm", (PROBLEM,)),
+    WorkerReady("eye", PluginDescription("eye", "1.0")),
     appeared("usb1", "/dev/x", ID_MODEL="PTU"),
-    events.DeviceRemoved("usb1"),
+    DeviceRemoved("usb1"),
 ]
 
 

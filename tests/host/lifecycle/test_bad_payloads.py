@@ -13,7 +13,8 @@ from tests.kit.clock import VirtualClock
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.core.records import ComponentState, Step
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.step import Step
 from nondum.host.workers.spec import Timing
 
 pytestmark = pytest.mark.anyio

@@ -7,8 +7,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.host.lifecycle.states import AT, active, after, component, drive, found, way_to_active
 
-from nondum.host.core import effects, events
-from nondum.host.core.records import Step
+from nondum.host.core import effects
+from nondum.host.core.events.drives import DriveRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    ComponentsProbed,
+    ForgetAsked,
+    PayloadActivated,
+    PayloadCleared,
+    PayloadCopied,
+    PayloadRefused,
+    PayloadVerified,
+)
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.recovery import recover
 
@@ -16,7 +27,7 @@ OTHER = "eye--org-y"
 """What `eye` of the payload `org.y` is called beside that of `org.x`."""
 
 
-def second(key: str = "k2", drive: str = "b", words: str = "") -> list[events.Event]:
+def second(key: str = "k2", drive: str = "b", words: str = "") -> list[Event]:
     """The way of another maker's payload whose component has the id `eye` as well."""
     return way_to_active(key, drive, payload_id="org.y", words=words, called=OTHER)
 
@@ -25,8 +36,8 @@ def both(words: str = "") -> HostState:
     return after(drive("b"), *second(words=words), state=active())[0]
 
 
-def pulled(drive: str, key: str) -> tuple[events.Event, ...]:
-    return events.DriveRemoved(drive), events.PayloadCleared(key)
+def pulled(drive: str, key: str) -> tuple[Event, ...]:
+    return DriveRemoved(drive), PayloadCleared(key)
 
 
 def test_two_payloads_with_a_component_of_one_id_are_active_together() -> None:
@@ -49,7 +60,7 @@ def test_its_workers_are_started_by_that_name() -> None:
 
 
 def test_a_payload_holds_its_names_until_its_workers_have_ended() -> None:
-    state, _ = after(events.DriveRemoved("a"), drive("b"), *second()[:3], state=active())
+    state, _ = after(DriveRemoved("a"), drive("b"), *second()[:3], state=active())
     assert state.payloads["k2"].components == (OTHER,)
 
 
@@ -60,7 +71,7 @@ def test_one_that_was_never_active_and_has_gone_holds_none() -> None:
 
 
 def test_one_that_was_refused_holds_none() -> None:
-    refused = events.PayloadRefused("k1", ())
+    refused = PayloadRefused("k1", ())
     state, _ = after(drive("a"), *way_to_active()[:3], refused)
     state, _ = after(drive("b"), *second()[:3], state=state)
     assert state.payloads["k2"].components == ("eye",)
@@ -110,7 +121,7 @@ def test_two_releases_that_come_in_together_have_one_name() -> None:
     newer = way_to_active("k3", "c", payload_id="org.y", called=OTHER)[:3]
     newer[0] = found("k3", "c", payload_id="org.y", release=2)
     state, _ = after(drive("b"), drive("c"), *second()[:3], *pulled("a", "k1"), state=active())
-    state, _ = after(events.ForgetAsked("org.x"), *newer, state=state)
+    state, _ = after(ForgetAsked("org.x"), *newer, state=state)
     assert state.payloads["k3"].components == state.payloads["k2"].components == (OTHER,)
 
 
@@ -118,8 +129,8 @@ def test_a_component_that_comes_with_a_release_gets_a_name_then() -> None:
     before, _ = after(
         drive("c"), *way_to_active("k9", "c", "arm", payload_id="org.z"), state=active()
     )
-    newer = [found("k2", "b", release=2), events.PayloadCopied("k2")]
-    verified = events.PayloadVerified("k2", ("eye", "arm"))
+    newer = [found("k2", "b", release=2), PayloadCopied("k2")]
+    verified = PayloadVerified("k2", ("eye", "arm"))
     state, _ = after(drive("b"), *newer, verified, state=before)
     assert state.payloads["k2"].names == {"eye": "eye", "arm": "arm--org-x"}
 
@@ -135,7 +146,7 @@ def test_own_name_is_free_while_its_payload_is_away() -> None:
 
 def test_a_forgotten_payload_gives_up_its_other_name() -> None:
     gone, _ = after(*pulled("a", "k1"), *pulled("b", "k2"), state=both())
-    forgotten, _ = after(events.ForgetAsked("org.y"), state=gone)
+    forgotten, _ = after(ForgetAsked("org.y"), state=gone)
     kept, _ = after(drive("b"), *second()[:3], state=gone)
     free, _ = after(drive("b"), *second()[:3], state=forgotten)
     assert kept.payloads["k2"].components == (OTHER,)
@@ -183,8 +194,8 @@ def test_whatever_comes_and_goes_no_two_have_one_name_and_none_changes_it(
             state = recover(state, AT).state
             for one in [p for p in state.payloads.values() if p.step is Step.STORED]:
                 entered = component(payload=one.key, called=one.components[0])
-                activated = events.PayloadActivated(one.key, (entered,))
-                state, _ = after(events.ComponentsProbed(one.key), activated, state=state)
+                activated = PayloadActivated(one.key, (entered,))
+                state, _ = after(ComponentsProbed(one.key), activated, state=state)
         elif key in state.payloads:
             state, _ = after(*pulled(key, key), state=state)
             if told[payload_id] == "eye":  # its own is free then
@@ -193,7 +204,7 @@ def test_whatever_comes_and_goes_no_two_have_one_name_and_none_changes_it(
             way = way_to_active(key, key, payload_id=payload_id)
             state, _ = after(drive(key), *way[:-1], state=state)
             entered = component(payload=key, called=state.payloads[key].components[0])
-            state, _ = after(events.PayloadActivated(key, (entered,)), state=state)
+            state, _ = after(PayloadActivated(key, (entered,)), state=state)
         active = [p for p in state.payloads.values() if p.step is Step.ACTIVE]
         assert len(state.components) == len(active)
         for one in active:

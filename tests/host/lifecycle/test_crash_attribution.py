@@ -8,9 +8,14 @@ from pathlib import Path
 import pytest
 from tests.host.lifecycle.states import AT, active, after, at_step, drive, found, way_to_active
 
-from nondum.host.core import effects, events
-from nondum.host.core.events import Event
-from nondum.host.core.records import DriveState, Moment, Step
+from nondum.host.core import effects
+from nondum.host.core.events.daemon import HostStable
+from nondum.host.core.events.drives import DriveInserted, DriveRead, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import PayloadCleared, RetryAsked
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.crash_attribution import ATTEMPTS, STEADY_S
@@ -38,14 +43,14 @@ def on(state: HostState, *happened: Event) -> HostState:
 
 @pytest.mark.parametrize("step", BEGUN)
 def test_payload_that_was_begun_is_counted(step: Step) -> None:
-    read = on(at_step(step), events.DriveRead("a", ("k1",)))
+    read = on(at_step(step), DriveRead("a", ("k1",)))
     assert died(read).tries == {"k1": 1}
     assert died(stopped(read)).tries == {}
 
 
 @pytest.mark.parametrize("step", [Step.REFUSED, Step.QUARANTINED, Step.REMOVING])
 def test_payload_that_waits_is_not_counted(step: Step) -> None:
-    assert died(on(at_step(step), events.DriveRead("a", ("k1",)))).tries == {}
+    assert died(on(at_step(step), DriveRead("a", ("k1",)))).tries == {}
 
 
 def test_drive_that_was_being_read_is_counted() -> None:
@@ -59,7 +64,7 @@ def test_guests_that_ran_are_to_blame_only_where_nothing_was_begun() -> None:
 
 def test_what_is_installed_for_good_is_never_to_blame_while_it_runs() -> None:
     installed = on(HostState("spot"), drive("a", "installed"), *way_to_active())
-    assert died(on(installed, events.DriveRead("a", ("k1",)))).tries == {}
+    assert died(on(installed, DriveRead("a", ("k1",)))).tries == {}
 
 
 def test_drive_is_left_alone_until_it_is_plugged_in_again() -> None:
@@ -71,7 +76,7 @@ def test_drive_is_left_alone_until_it_is_plugged_in_again() -> None:
     assert again.drives["a"].state is DriveState.IDLE
     assert [problem.code for problem in again.drives["a"].problems] == ["QUARANTINED"]
     assert died(stopped(again)).tries == {DRIVE: ATTEMPTS}
-    pulled, done = after(events.DriveRemoved("a"), drive(), state=again)
+    pulled, done = after(DriveRemoved("a"), drive(), state=again)
     assert any(isinstance(effect, effects.ReadDrive) for effect in done)
     assert not pulled.tries
 
@@ -79,21 +84,21 @@ def test_drive_is_left_alone_until_it_is_plugged_in_again() -> None:
 def test_drive_that_was_pulled_while_no_daemon_ran_is_forgotten_after_a_while() -> None:
     """It may only be found late."""
     state = died(on(HostState("spot"), drive()))
-    scanned = on(state, events.DrivesScanned("slot", ()))
+    scanned = on(state, DrivesScanned("slot", ()))
     assert scanned.tries == {DRIVE: 1}
     assert died(on(scanned, drive())).tries == {DRIVE: 2}
-    assert not on(scanned, events.HostStable("spot")).tries
+    assert not on(scanned, HostStable("spot")).tries
 
 
-def numbered(number: int, mark: str = "Acme-0042") -> events.DriveInserted:
+def numbered(number: int, mark: str = "Acme-0042") -> DriveInserted:
     """A drive as the kernel numbers it; what it says of itself stays."""
-    return events.DriveInserted(f"sda-{number}", Path("/mounts"), "block", mark=mark)
+    return DriveInserted(f"sda-{number}", Path("/mounts"), "block", mark=mark)
 
 
 def test_drive_is_left_alone_after_the_machine_has_started_again() -> None:
     state = HostState("spot")
     for number in range(ATTEMPTS):
-        state = died(on(state, numbered(number), events.DrivesScanned("block", (f"sda-{number}",))))
+        state = died(on(state, numbered(number), DrivesScanned("block", (f"sda-{number}",))))
     assert on(state, numbered(9)).drives["sda-9"].problems[0].code == "QUARANTINED"
     assert not on(state, numbered(9, "Acme-0043")).drives["sda-9"].problems
 
@@ -103,7 +108,7 @@ def test_drive_that_carried_what_ran_is_counted_on_under_its_new_number() -> Non
     first = on(HostState("spot"), numbered(1), found(drive="sda-1"), *way_to_active()[2:])
     reading = on(first, numbered(1))
     assert reading.drives["sda-1"].state is DriveState.READING
-    state = on(died(reading), numbered(2), events.DrivesScanned("block", ("sda-2",)))
+    state = on(died(reading), numbered(2), DrivesScanned("block", ("sda-2",)))
     assert set(state.drives) == {"sda-2"}
     assert state.tries["block:Acme-0042"] == 1
 
@@ -112,19 +117,17 @@ def test_drive_that_carried_what_ran_is_counted_on_under_its_new_number() -> Non
 def test_payload_is_left_alone_after_the_machine_has_started_again(is_found_late: bool) -> None:
     state = HostState("spot")
     for _ in range(ATTEMPTS):
-        state = died(
-            on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
-        )
-    state = on(state, numbered(1), found(drive="sda-1"), events.DriveRead("sda-1", ("k1",)))
-    state = on(state, events.HostStable("spot"))
+        state = died(on(state, numbered(1), found(drive="sda-1"), DriveRead("sda-1", ("k1",))))
+    state = on(state, numbered(1), found(drive="sda-1"), DriveRead("sda-1", ("k1",)))
+    state = on(state, HostStable("spot"))
     assert state.payloads["k1"].step is Step.REFUSED
-    scanned = events.DrivesScanned("block", () if is_found_late else ("sda-2",))
+    scanned = DrivesScanned("block", () if is_found_late else ("sda-2",))
     news = (scanned, numbered(2)) if is_found_late else (numbered(2), scanned)
-    cleared = events.PayloadCleared("k1")
+    cleared = PayloadCleared("k1")
     state = on(died(state), *news, cleared, found(drive="sda-2"))
     assert set(state.drives) == {"sda-2"}
     assert state.payloads["k1"].step is Step.REFUSED
-    pulled = on(state, events.DriveRemoved("sda-2"), cleared)
+    pulled = on(state, DriveRemoved("sda-2"), cleared)
     assert not pulled.tries
     again = on(pulled, numbered(3), found(drive="sda-3"))
     assert again.payloads["k1"].step is Step.RECEIVED
@@ -132,39 +135,39 @@ def test_payload_is_left_alone_after_the_machine_has_started_again(is_found_late
 
 def test_drive_under_its_new_number_is_pulled_like_any() -> None:
     state = on(died(on(HostState("spot"), numbered(1))), numbered(2))
-    assert not on(state, events.DriveRemoved("sda-2")).tries.keys() & {"block:Acme-0042"}
+    assert not on(state, DriveRemoved("sda-2")).tries.keys() & {"block:Acme-0042"}
 
 
 def test_payload_is_refused_after_too_many_deaths_and_retried_when_asked() -> None:
     state = HostState("spot")
-    read = events.DriveRead("a", ("k1",))
+    read = DriveRead("a", ("k1",))
     for _ in range(ATTEMPTS):
         state = died(on(state, drive(), found(), read))
     state, done = after(drive(), found(), read, state=state)
     assert state.payloads["k1"].step is Step.REFUSED
     assert [problem.code for problem in state.payloads["k1"].problems] == ["QUARANTINED"]
     assert not any(isinstance(effect, effects.CopyPayload) for effect in done)
-    cleared = events.PayloadCleared("k1")
-    state, done = after(events.RetryAsked("k1"), cleared, found(), state=state)
+    cleared = PayloadCleared("k1")
+    state, done = after(RetryAsked("k1"), cleared, found(), state=state)
     assert state.payloads["k1"].step is Step.RECEIVED
     assert any(isinstance(effect, effects.CopyPayload) for effect in done)
 
 
 def test_daemon_that_lives_on_clears_what_is_active_for_long_enough() -> None:
     state = died(active())
-    back = on(state, drive(), events.DriveRead("a", ("k1",)), *way_to_active()[5:])
-    assert on(back, events.HostStable("spot")).tries == {"k1": 1}
-    assert not advance(back, events.HostStable("spot"), LATER).state.tries
+    back = on(state, drive(), DriveRead("a", ("k1",)), *way_to_active()[5:])
+    assert on(back, HostStable("spot")).tries == {"k1": 1}
+    assert not advance(back, HostStable("spot"), LATER).state.tries
 
 
 @pytest.mark.parametrize(("step", "is_kept"), [(Step.STORED, True), (Step.REFUSED, False)])
 def test_what_is_still_begun_stays_counted(step: Step, is_kept: bool) -> None:
-    state = replace(on(at_step(step), events.DriveRead("a", ("k1",))), tries={"k1": 1})
-    assert on(state, events.HostStable("spot")).tries == ({"k1": 1} if is_kept else {})
+    state = replace(on(at_step(step), DriveRead("a", ("k1",))), tries={"k1": 1})
+    assert on(state, HostStable("spot")).tries == ({"k1": 1} if is_kept else {})
 
 
 def test_nothing_is_cleared_while_a_drive_is_being_read() -> None:
     state = replace(on(HostState("spot"), drive()), tries={"k9": 3})
-    assert on(state, events.HostStable("spot")).tries == {"k9": 3}
-    read = on(state, events.DriveRead("a", ()))
-    assert not on(read, events.HostStable("spot")).tries
+    assert on(state, HostStable("spot")).tries == {"k9": 3}
+    read = on(state, DriveRead("a", ()))
+    assert not on(read, HostStable("spot")).tries

@@ -11,8 +11,10 @@ from tests.host.sources.devices.sightings import camera_with_microphone, serial_
 
 from nondum.host.core import effects
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import DeviceAppeared, DeviceChanged, DeviceRemoved, Event
-from nondum.host.core.records import ComponentRecord, DeviceClaim, DeviceRecord
+from nondum.host.core.events.devices import DeviceAppeared, DeviceChanged, DeviceRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.device import DeviceClaim, DeviceRecord
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.sources.devices.hardware import Part, devices

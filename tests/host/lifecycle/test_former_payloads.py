@@ -9,18 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.lifecycle.states import AT, active, after, at_step, found, way_to_active
 
-from nondum.host.core.events import (
-    DriveInserted,
-    DriveRemoved,
-    DrivesScanned,
-    Event,
+from nondum.host.core.events.catalogue import Recomposed
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
     ForgetAsked,
     PayloadCleared,
     PayloadFailed,
     PayloadWithdrawn,
-    Recomposed,
 )
-from nondum.host.core.records import FormerPayload, PayloadRecord, Step
+from nondum.host.core.records.payload import FormerPayload, PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import former_payloads
 from nondum.host.lifecycle.advance import advance

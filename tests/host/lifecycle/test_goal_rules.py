@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from nondum.host.core.events import Event, GoalEnded, GoalGiven, GoalReached
-from nondum.host.core.records import GoalRecord, Moment
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.goals import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.moment import Moment
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.lifecycle.recovery import recover

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.core.records import Step
+from nondum.host.core.records.step import Step
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS, RECOVERY, diagram
 
 PAGE = (Path(__file__).parents[3] / "docs/lifecycle.md").read_text(encoding="utf-8")

@@ -13,15 +13,13 @@ from tests.kit.host import HOST, LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
 from nondum.host.catalogue.catalogue import Catalogue
-from nondum.host.core.events import (
-    DrivesScanned,
-    Emit,
-    Event,
-    HostStable,
-    MountSet,
-    PayloadActivated,
-)
-from nondum.host.core.records import ComponentState, Step
+from nondum.host.core.events.daemon import HostStable
+from nondum.host.core.events.drives import DrivesScanned
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.mounts import MountSet
+from nondum.host.core.events.payloads import PayloadActivated
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.initial_components import install, uninstall

@@ -13,23 +13,24 @@ from tests.host.lifecycle.states import AT, PROBLEM, after, drive, found, way_to
 from tests.kit.host import LAMP, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
-from nondum.host.core.records import Step
+from nondum.host.core.events.drives import DriveRead, DriveRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import PayloadFound, PayloadRefused, PayloadWithdrawn
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.advance import advance
 from nondum.host.workers.spec import Timing
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.build import build
 
-SCANNED = events.DriveRead("a", ("k2",))
+SCANNED = DriveRead("a", ("k2",))
 UNSIGNED = Problem("SIG_MISSING", "made up")
 LAMP_ID = "org.example.lamp"
 
 
 def at_work() -> HostState:
     """A payload is active, and another release lies in its place on its drive."""
-    state, _ = after(drive(), *way_to_active("k1"), events.DriveRead("a", ("k1",)))
+    state, _ = after(drive(), *way_to_active("k1"), DriveRead("a", ("k1",)))
     state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
     return state
 
@@ -49,25 +50,25 @@ def test_the_old_release_is_withdrawn_once_the_new_one_is_in_force() -> None:
 
 @pytest.mark.parametrize("problem", [PROBLEM, UNSIGNED], ids=["wrong", "unsigned"])
 def test_the_old_release_goes_on_where_the_new_one_is_refused(problem: Problem) -> None:
-    state, _ = after(events.PayloadRefused("k2", (problem,)), state=at_work())
-    state, _ = after(drive(), found("k3", release=3), events.DriveRead("a", ("k3",)), state=state)
+    state, _ = after(PayloadRefused("k2", (problem,)), state=at_work())
+    state, _ = after(drive(), found("k3", release=3), DriveRead("a", ("k3",)), state=state)
     assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.REMOVING, "k3": Step.RECEIVED}
 
 
 def test_the_old_release_goes_with_the_drive() -> None:
-    state, _ = after(events.DriveRemoved("a"), state=at_work())
+    state, _ = after(DriveRemoved("a"), state=at_work())
     assert steps(state) == {"k1": Step.REMOVING, "k2": Step.REMOVING}
 
 
 LATER: dict[str, Callable[[], Event]] = {
-    "nothing": lambda: events.DriveRead("a", ()),
-    "another payload": lambda: events.DriveRead("a", ("k9",)),
+    "nothing": lambda: DriveRead("a", ()),
+    "another payload": lambda: DriveRead("a", ("k9",)),
 }
 
 
 @pytest.mark.parametrize("read", LATER.values(), ids=LATER)
 def test_what_nothing_lies_in_the_place_of_is_withdrawn(read: Callable[[], Event]) -> None:
-    state, _ = after(drive(), *way_to_active("k1"), events.DriveRead("a", ("k1",)))
+    state, _ = after(drive(), *way_to_active("k1"), DriveRead("a", ("k1",)))
     other = found("k9", payload_id="org.other")
     state, _ = after(drive(), other, read(), state=state)
     assert steps(state)["k1"] is Step.REMOVING
@@ -75,7 +76,7 @@ def test_what_nothing_lies_in_the_place_of_is_withdrawn(read: Callable[[], Event
 
 def test_what_is_being_copied_is_withdrawn_at_once() -> None:
     """What it was to be copied from is not there any more."""
-    state, _ = after(drive(), found("k1"), events.DriveRead("a", ("k1",)))
+    state, _ = after(drive(), found("k1"), DriveRead("a", ("k1",)))
     state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
     assert steps(state) == {"k1": Step.REMOVING, "k2": Step.RECEIVED}
 
@@ -83,27 +84,27 @@ def test_what_is_being_copied_is_withdrawn_at_once() -> None:
 @pytest.mark.parametrize("problem", [PROBLEM, UNSIGNED], ids=["wrong", "unsigned"])
 def test_what_was_refused_and_rebuilt_is_told_so_and_then_judged(problem: Problem) -> None:
     """That it was rebuilt comes first, also where the new one is refused as soon as it is found."""
-    state, _ = after(drive(), found("k1"), events.PayloadRefused("k1", (PROBLEM,)))
+    state, _ = after(drive(), found("k1"), PayloadRefused("k1", (PROBLEM,)))
     state, _ = after(drive(), state=state)
     outcome = advance(state, replace(found("k2", release=2), problems=(problem,)), AT)
-    told = [event for event in outcome.events if not isinstance(event, events.PayloadFound)]
+    told = [event for event in outcome.events if not isinstance(event, PayloadFound)]
     assert told[:2] == [
-        events.PayloadWithdrawn("k1", "it was built again in its place", "k2"),
-        events.PayloadRefused("k2", (problem,)),
+        PayloadWithdrawn("k1", "it was built again in its place", "k2"),
+        PayloadRefused("k2", (problem,)),
     ]
     assert steps(outcome.state) == {"k1": Step.REMOVING, "k2": Step.REFUSED}
 
 
 def test_what_was_rebuilt_on_one_of_its_drives_stays_for_the_other() -> None:
     state, _ = after(drive(), drive("b"), found("k1"), found("k1", "b"))
-    state, _ = after(events.PayloadRefused("k1", (PROBLEM,)), state=state)
+    state, _ = after(PayloadRefused("k1", (PROBLEM,)), state=state)
     state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
     assert steps(state) == {"k1": Step.REFUSED, "k2": Step.RECEIVED}
     assert [*state.payloads["k1"].sources] == ["b"]
 
 
 def test_a_release_on_a_drive_of_its_own_stays() -> None:
-    state, _ = after(drive("b"), *way_to_active("k1", "b"), events.DriveRead("b", ("k1",)))
+    state, _ = after(drive("b"), *way_to_active("k1", "b"), DriveRead("b", ("k1",)))
     state, _ = after(drive(), found("k2", release=2), SCANNED, state=state)
     state, _ = after(*way_to_active("k2")[1:], state=state)
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
@@ -121,12 +122,12 @@ def test_a_release_on_a_drive_of_its_own_stays() -> None:
 def test_what_was_refused_for_its_signatures_is_tried_again_once_it_is_signed(
     refused: tuple[Problem, ...], told: tuple[Problem, ...], step: Step
 ) -> None:
-    state, _ = after(drive(), found("k1"), events.PayloadRefused("k1", refused))
+    state, _ = after(drive(), found("k1"), PayloadRefused("k1", refused))
     again = found("k1")
-    again = events.PayloadFound(
+    again = PayloadFound(
         *(again.payload, again.drive, again.folder, again.digest, "org.x", "1.0", 1), problems=told
     )
-    state, _ = after(drive(), again, events.DriveRead("a", ("k1",)), state=state)
+    state, _ = after(drive(), again, DriveRead("a", ("k1",)), state=state)
     assert steps(state) == {"k1": step}
 
 

@@ -21,10 +21,28 @@ from tests.host.lifecycle.states import (
 )
 from tests.host.sources.devices.sightings import appeared
 
-from nondum.host.core import effects, events
+from nondum.host.core import effects
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import Event
-from nondum.host.core.records import ComponentState, PayloadRecord, Step
+from nondum.host.core.events.drives import DriveRead, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.mounts import MountSet
+from nondum.host.core.events.payloads import (
+    ComponentsProbed,
+    PayloadActivated,
+    PayloadCleared,
+    PayloadCopied,
+    PayloadFailed,
+    PayloadFound,
+    PayloadStaged,
+    PayloadVerified,
+    RetryAsked,
+    WheelsStored,
+)
+from nondum.host.core.events.releases import BesideRefused, RollbackAsked, TrialFailed
+from nondum.host.core.events.workers import WorkerExited, WorkerFailed
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import releases
 from nondum.host.lifecycle.advance import advance
@@ -39,7 +57,7 @@ TAKEN_IN = (Step.SUPERSEDED, Step.STORED, Step.PROBED, Step.ACTIVE)
 def upgraded(*, need: str = "") -> HostState:
     """Release 2 (`k2`, drive `b`) is active, release 1 (`k1`, drive `a`) waits."""
     newer = upgrade()
-    entered = events.PayloadActivated("k2", (component("eye", "k2", need),))
+    entered = PayloadActivated("k2", (component("eye", "k2", need),))
     return after(drive("b"), *newer[:-1], entered, state=active(need=need))[0]
 
 
@@ -59,7 +77,7 @@ def test_newer_release_is_brought_up_beside_the_one_in_force() -> None:
     assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.STORED}
     assert effects.ProbeComponents("k2", beside="k1") in done
     assert state.components["eye"].payload == "k1"
-    state, done = after(events.ComponentsProbed("k2"), state=state)
+    state, done = after(ComponentsProbed("k2"), state=state)
     assert done == [effects.ActivatePayload("k2", beside="k1")]
 
 
@@ -82,11 +100,11 @@ def test_it_takes_over_in_one_revision() -> None:
 def test_ranks_mounts_and_devices_are_kept() -> None:
     port = appeared("usb1", "/dev/x", ID_MODEL="PTU")
     rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
-    said = events.MountSet("spot__eye__camera", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    said = MountSet("spot__eye__camera", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     before, _ = after(port, drive("c"), *rival, said, state=active(need="PTU"))
     assert before.components["eye"].devices[0].device == "usb1"
     new = component("eye", "k2", "PTU")
-    entered = events.PayloadActivated("k2", (new,))
+    entered = PayloadActivated("k2", (new,))
     state, done = after(drive("b"), *upgrade()[:-1], entered, state=before)
     assert state.components["eye"].rank == before.components["eye"].rank
     assert state.components["eye"].devices[0].device == "usb1"
@@ -99,7 +117,7 @@ def test_device_goes_to_a_component_that_has_another_name_now() -> None:
     port = appeared("usb1", "/dev/x", ID_MODEL="PTU")
     rival = way_to_active("k9", "c", "arm", "PTU", payload_id="org.y")
     before, _ = after(port, drive("c"), *rival, state=active(need="PTU"))
-    entered = events.PayloadActivated("k2", (component("gaze", "k2", "PTU"),))
+    entered = PayloadActivated("k2", (component("gaze", "k2", "PTU"),))
     newer = upgrade(id="gaze")
     state, _ = after(drive("b"), *newer[:-1], entered, state=before)
     assert state.components["gaze"].devices[0].device == "usb1"
@@ -112,8 +130,8 @@ def test_device_goes_to_a_component_that_has_another_name_now() -> None:
 @pytest.mark.parametrize(
     "event",
     [
-        events.PayloadFailed("k2", (PROBLEM,)),
-        events.TrialFailed("k2", "eye", (PROBLEM,)),
+        PayloadFailed("k2", (PROBLEM,)),
+        TrialFailed("k2", "eye", (PROBLEM,)),
     ],
     ids=lambda event: event.name,
 )
@@ -128,13 +146,13 @@ def test_release_that_fails_while_it_is_watched_leaves_the_old_one_alone(event: 
 
 def test_worker_of_the_one_in_force_may_restart_meanwhile() -> None:
     before, _ = after(drive("b"), *upgrade()[:6], state=active())
-    state, _ = after(events.WorkerExited("eye", "signal 9", "k1"), state=before)
+    state, _ = after(WorkerExited("eye", "signal 9", "k1"), state=before)
     assert state.components["eye"].state is ComponentState.RESTARTING
     assert steps(state)["k2"] is Step.PROBED
 
 
 def test_release_that_fails_as_it_takes_over_gives_way() -> None:
-    failed = events.TrialFailed("k2", "eye", (PROBLEM,))
+    failed = TrialFailed("k2", "eye", (PROBLEM,))
     state, _ = after(failed, state=upgraded())
     assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
 
@@ -142,27 +160,27 @@ def test_release_that_fails_as_it_takes_over_gives_way() -> None:
 def test_old_worker_that_ends_as_it_is_replaced_is_no_news() -> None:
     state = upgraded()
     for event in (
-        events.WorkerExited("eye", "signal 9", "k1"),
-        events.WorkerFailed("eye", (PROBLEM,), "k1"),
+        WorkerExited("eye", "signal 9", "k1"),
+        WorkerFailed("eye", (PROBLEM,), "k1"),
     ):
         assert after(event, state=state) == (state, [])
 
 
 def test_release_that_breaks_later_gives_way_to_the_one_before() -> None:
-    state, done = after(events.WorkerFailed("eye", (PROBLEM,), "k2"), state=upgraded())
+    state, done = after(WorkerFailed("eye", (PROBLEM,), "k2"), state=upgraded())
     assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
     assert done == [effects.SuspendPayload("k2", ("eye",)), effects.ProbeComponents("k1")]
 
 
 def test_release_that_cannot_run_beside_the_other_one_takes_its_place_first() -> None:
     before, _ = after(drive("b"), *upgrade()[:5], state=active())
-    state, done = after(events.BesideRefused("k2", "no memory"), state=before)
+    state, done = after(BesideRefused("k2", "no memory"), state=before)
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.STORED}
     assert set(done) == {
         effects.RestPayload("k1", ("eye",)),
         effects.ProbeComponents("k2", after="k1"),
     }
-    state, done = after(events.PayloadFailed("k2", (PROBLEM,)), state=state)
+    state, done = after(PayloadFailed("k2", (PROBLEM,)), state=state)
     assert steps(state) == {"k1": Step.STORED, "k2": Step.QUARANTINED}
     assert effects.ProbeComponents("k1") in done
 
@@ -190,8 +208,8 @@ def saying(key: str, description: PluginDescription) -> list[Event]:
     """The way of a release of the eye whose index says that."""
     way = way_to_active() if key == "k1" else upgrade(key)
     entered = replace(component("eye", key), description=description)
-    way[2] = events.PayloadVerified(key, ("eye",), {"eye": description})
-    way[-1] = events.PayloadActivated(key, (entered,))
+    way[2] = PayloadVerified(key, ("eye",), {"eye": description})
+    way[-1] = PayloadActivated(key, (entered,))
     return way
 
 
@@ -229,7 +247,7 @@ def test_release_that_keeps_another_payload_out_of_planning_is_refused() -> None
     other = PluginDescription("audio", "1", fragments=(Fragment("m", heard.format("?h - host")),))
     way = way_to_active("k9", "c", "audio", payload_id="org.y")
     entered = replace(component("audio", "k9"), description=other)
-    way[-1] = events.PayloadActivated("k9", (entered,))
+    way[-1] = PayloadActivated("k9", (entered,))
     before, _ = after(drive("a"), *saying("k1", says("known")), drive("c"), *way)
     more = Fragment("more.pddl", heard.format("?h - host ?of - host"))
     unlike = replace(says("known"), fragments=(*says("known").fragments, more))
@@ -253,14 +271,14 @@ def test_release_that_came_first_gives_way_to_an_older_one_that_can_be_planned_w
 
 
 def test_pulled_release_gives_way_to_the_one_that_waits() -> None:
-    state, done = after(events.DriveRemoved("b"), state=upgraded())
+    state, done = after(DriveRemoved("b"), state=upgraded())
     assert steps(state) == {"k1": Step.STORED, "k2": Step.REMOVING}
     assert effects.ProbeComponents("k1") in done
 
 
 def test_old_drive_may_be_pulled_during_the_bring_up() -> None:
     before, _ = after(drive("b"), *upgrade()[:5], state=active())
-    state, _ = after(events.DriveRemoved("a"), *upgrade()[5:], state=before)
+    state, _ = after(DriveRemoved("a"), *upgrade()[5:], state=before)
     assert steps(state) == {"k1": Step.REMOVING, "k2": Step.ACTIVE}
 
 
@@ -289,14 +307,14 @@ def test_same_release_with_other_content_never_waits_beside() -> None:
 FLEETS = pytest.mark.parametrize(("one", "other"), [("", "survey"), ("survey", ""), ("a", "b")])
 
 
-def for_fleet(fleet: str, key: str, drive: str, release: int) -> events.PayloadFound:
+def for_fleet(fleet: str, key: str, drive: str, release: int) -> PayloadFound:
     return replace(found(key, drive, release=release), fleet=fleet)
 
 
 @FLEETS
 def test_older_release_does_not_come_in_by_naming_another_fleet(one: str, other: str) -> None:
     entered = drive("a"), for_fleet(one, "k9", "a", 9), *way_to_active("k9")[1:]
-    gone = events.DriveRemoved("a"), events.PayloadCleared("k9")
+    gone = DriveRemoved("a"), PayloadCleared("k9")
     state, _ = after(*entered, *gone, drive("b"), for_fleet(other, "k3", "b", 3))
     assert codes(state, "k3") == ["ROLLBACK"]
     assert state.highwater["org.x"].release == 9
@@ -311,7 +329,7 @@ def test_releases_of_one_payload_for_several_fleets_take_over_from_each_other(
     state, done = after(*entered, *newer)
     assert effects.ProbeComponents("k2", beside="k1") in done
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
-    back, _ = after(events.RollbackAsked("k1", 1, 2), *way_to_active()[5:], state=state)
+    back, _ = after(RollbackAsked("k1", 1, 2), *way_to_active()[5:], state=state)
     assert steps(back) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
     assert back.highwater["org.x"].release == 2
 
@@ -327,7 +345,7 @@ def test_one_release_for_two_fleets_has_one_content(one: str, other: str) -> Non
 
 
 def test_person_goes_back_and_the_newer_one_waits() -> None:
-    state, done = after(events.RollbackAsked("k1", 1, 2), state=upgraded())
+    state, done = after(RollbackAsked("k1", 1, 2), state=upgraded())
     assert steps(state) == {"k1": Step.STORED, "k2": Step.ACTIVE}
     assert done == [effects.ProbeComponents("k1", beside="k2")]
     back, _ = after(*way_to_active()[5:], state=state)
@@ -337,7 +355,7 @@ def test_person_goes_back_and_the_newer_one_waits() -> None:
 
 
 def gone_back() -> HostState:
-    asked = events.RollbackAsked("k1", 1, 2)
+    asked = RollbackAsked("k1", 1, 2)
     return after(asked, *way_to_active()[5:], state=upgraded())[0]
 
 
@@ -353,30 +371,30 @@ def test_still_newer_release_counts_again() -> None:
 
 
 def test_retry_goes_forward_again() -> None:
-    state, done = after(events.RetryAsked("k2"), state=gone_back())
+    state, done = after(RetryAsked("k2"), state=gone_back())
     assert done == [effects.ProbeComponents("k2", beside="k1")]
     assert not state.rollbacks
 
 
 def test_newer_release_that_is_plugged_in_again_counts_again() -> None:
-    pulled, _ = after(events.DriveRemoved("b"), events.PayloadCleared("k2"), state=gone_back())
+    pulled, _ = after(DriveRemoved("b"), PayloadCleared("k2"), state=gone_back())
     state, _ = after(drive("b"), *upgrade(), state=pulled)
     assert steps(state) == {"k1": Step.SUPERSEDED, "k2": Step.ACTIVE}
 
 
 def test_refused_older_release_is_let_pass_once() -> None:
-    refused, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=upgraded())
-    refused, _ = after(drive("a"), found(), events.DriveRead("a", ("k1",)), state=refused)
+    refused, _ = after(DriveRemoved("a"), PayloadCleared("k1"), state=upgraded())
+    refused, _ = after(drive("a"), found(), DriveRead("a", ("k1",)), state=refused)
     assert codes(refused, "k1") == ["ROLLBACK"]
     target = releases.can_go_back_to(refused, refused.payloads["k2"])
     assert target is not None
     assert target.key == "k1"
-    asked = events.RollbackAsked("k1", 1, 2)
-    state, done = after(asked, events.PayloadCleared("k1"), state=refused)
+    asked = RollbackAsked("k1", 1, 2)
+    state, done = after(asked, PayloadCleared("k1"), state=refused)
     assert "a" in [one.drive for one in done if isinstance(one, effects.ReadDrive)]
     state, _ = after(*way_to_active(), state=state)
     assert steps(state) == {"k1": Step.ACTIVE, "k2": Step.SUPERSEDED}
-    again, _ = after(events.DriveRemoved("a"), events.PayloadCleared("k1"), state=state)
+    again, _ = after(DriveRemoved("a"), PayloadCleared("k1"), state=state)
     again, _ = after(drive("a"), found(), state=again)
     assert codes(again, "k1") == ["ROLLBACK"], "it was let pass once"
 
@@ -390,7 +408,7 @@ def test_what_is_refused_for_more_than_its_age_is_not_let_pass() -> None:
     )
     state = replace(state, payloads={**state.payloads, "k1": worse})
     assert releases.can_go_back_to(state, state.payloads["k2"]) is None
-    assert after(events.RollbackAsked("k1", 1, 2), state=state) == (state, [])
+    assert after(RollbackAsked("k1", 1, 2), state=state) == (state, [])
 
 
 # Crashing
@@ -447,11 +465,11 @@ class Releases(RuleBasedStateMachine):
         if release in self.plugged:
             self.plugged.remove(release)
             self.todo = [e for e in self.todo if getattr(e, "drive", "") != name(release)]
-            self.happen(events.DriveRemoved(name(release)))
+            self.happen(DriveRemoved(name(release)))
 
     @rule(release=st.sampled_from(RELEASES))
     def retry(self, release: int) -> None:
-        self.happen(events.RetryAsked(key(release)))
+        self.happen(RetryAsked(key(release)))
 
     @rule()
     def roll_back(self) -> None:
@@ -459,7 +477,7 @@ class Releases(RuleBasedStateMachine):
             if payload.step is Step.ACTIVE:
                 target = releases.can_go_back_to(self.state, payload)
                 if target is not None:
-                    asked = events.RollbackAsked(target.key, target.release, payload.release)
+                    asked = RollbackAsked(target.key, target.release, payload.release)
                     self.happen(asked)
 
     # What happens by itself
@@ -470,8 +488,8 @@ class Releases(RuleBasedStateMachine):
         payload = self.state.payloads.get(key(release))
         if payload is not None and payload.step in (Step.PROBED, Step.ACTIVE):
             is_tried = payload.step is Step.PROBED
-            fell = events.TrialFailed(payload.key, "eye", (PROBLEM,))
-            gone = events.WorkerFailed("eye", (PROBLEM,), payload.key)
+            fell = TrialFailed(payload.key, "eye", (PROBLEM,))
+            gone = WorkerFailed("eye", (PROBLEM,), payload.key)
             self.happen(fell if is_tried else gone)
 
     @rule(release=st.sampled_from(RELEASES))
@@ -486,7 +504,7 @@ class Releases(RuleBasedStateMachine):
         self.state, self.todo = outcome.state, list(outcome.effects)
         for release in sorted(self.plugged):
             self.happen(drive(name(release)))
-        self.happen(events.DrivesScanned("slot", tuple(map(name, sorted(self.plugged)))))
+        self.happen(DrivesScanned("slot", tuple(map(name, sorted(self.plugged)))))
 
     @precondition(lambda self: self.todo)
     @rule(which=st.integers(0, 20))
@@ -503,30 +521,30 @@ class Releases(RuleBasedStateMachine):
             case effects.ReadDrive(drive=where):
                 release = int(where[1:])
                 self.happen(found(key(release), where, release=release))
-                self.happen(events.DriveRead(where, (key(release),)))
+                self.happen(DriveRead(where, (key(release),)))
             case effects.CopyPayload(payload=payload):
-                self.happen(events.PayloadCopied(payload))
+                self.happen(PayloadCopied(payload))
             case effects.VerifyPayload(payload=payload):
-                self.happen(events.PayloadVerified(payload, ("eye",)))
+                self.happen(PayloadVerified(payload, ("eye",)))
             case effects.StagePayload(payload=payload):
-                self.happen(events.PayloadStaged(payload))
+                self.happen(PayloadStaged(payload))
             case effects.StoreWheels(payload=payload):
-                self.happen(events.WheelsStored(payload, 1))
+                self.happen(WheelsStored(payload, 1))
             case effects.ProbeComponents(payload=payload, beside=beside):
                 self.probe(payload, is_beside=bool(beside))
             case effects.ActivatePayload(payload=payload):
                 entered = component("eye", payload)
-                self.happen(events.PayloadActivated(payload, (entered,)))
+                self.happen(PayloadActivated(payload, (entered,)))
             case effects.ClearPayload(payload=payload):
-                self.happen(events.PayloadCleared(payload))
+                self.happen(PayloadCleared(payload))
 
     def probe(self, payload: str, *, is_beside: bool) -> None:
         if is_beside and self.alone:
-            self.happen(events.BesideRefused(payload, "test"))
+            self.happen(BesideRefused(payload, "test"))
         elif int(payload[1:]) in self.broken:
-            self.happen(events.PayloadFailed(payload, (PROBLEM,)))
+            self.happen(PayloadFailed(payload, (PROBLEM,)))
         else:
-            self.happen(events.ComponentsProbed(payload))
+            self.happen(ComponentsProbed(payload))
 
     # What holds
 

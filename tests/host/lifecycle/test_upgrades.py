@@ -8,11 +8,15 @@ from pathlib import Path
 
 import pytest
 from tests.kit.clock import VirtualClock
+from tests.kit.golden import Golden
 from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.behaviours import BehaviourEstablished
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.events.releases import BesideRefused, RollbackAsked
+from nondum.host.core.events.workers import WorkerExited
+from nondum.host.core.records.step import Step
 from nondum.host.manager.initial_components import install, uninstall
 from nondum.host.manager.rollback import go_back
 from nondum.host.workers.spec import Timing
@@ -86,12 +90,12 @@ async def test_newer_release_takes_over_and_the_old_one_comes_back(tmp_path: Pat
         assert version(host) == "2.0"
         assert host.workers.pids()["lamp"] != old
         again = host.workers.behave("lamp", "shine", {"u": UNIT})
-        established = events.BehaviourEstablished
+        established = BehaviourEstablished
         await host.until(lambda: established("lamp", "shine", again.id) in host.heard)
         assert shining.state.has_ended
         assert not is_running(old), "two releases never act at the same time"
         kinds = [type(event) for event in host.heard]
-        assert events.WorkerExited not in kinds
+        assert WorkerExited not in kinds
         host.pull("b")
         await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=None)
         assert version(host) == "1.0"
@@ -201,7 +205,9 @@ async def test_broken_release_leaves_the_old_one_alone(
 
 
 @pytest.mark.parametrize("source", [LAMP, "import no_such_module"], ids=["sound", "broken"])
-async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, source: str) -> None:
+async def test_release_that_runs_alone_takes_the_place_first(
+    tmp_path: Path, source: str, golden: Golden
+) -> None:
     """And gives it back, should it not work."""
     first = lamp(tmp_path, 1)
     described = None if source == LAMP else PluginDescription("test-lamp", "2.0")
@@ -219,8 +225,8 @@ async def test_release_that_runs_alone_takes_the_place_first(tmp_path: Path, sou
         else:
             await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.QUARANTINED)
         assert not is_running(old)
-        (refused,) = (e for e in host.heard if isinstance(e, events.BesideRefused))
-        assert refused.reason == "its manifest says that it runs alone"
+        (refused,) = (e for e in host.heard if isinstance(e, BesideRefused))
+        golden.check("the manifest says that it runs alone", refused.reason)
 
 
 async def test_new_drive_pulled_during_the_bring_up(tmp_path: Path) -> None:
@@ -270,7 +276,7 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
         await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
         first = host.release(LAMP_ID, 1)
         assert first is not None
-        host.bus.emit(events.RollbackAsked(first.key, 1, 2))
+        host.bus.emit(RollbackAsked(first.key, 1, 2))
         await host.until_releases(LAMP_ID, r1=Step.ACTIVE, r2=Step.SUPERSEDED)
         assert version(host) == "1.0"
     async with host_in_process(tmp_path, timing=QUICK) as host:
@@ -278,7 +284,7 @@ async def test_a_person_goes_back_and_forward(tmp_path: Path) -> None:
         assert version(host) == "1.0"
         second = host.release(LAMP_ID, 2)
         assert second is not None
-        host.bus.emit(events.RetryAsked(second.key))
+        host.bus.emit(RetryAsked(second.key))
         await host.until_releases(LAMP_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
 
 

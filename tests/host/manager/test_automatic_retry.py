@@ -10,9 +10,15 @@ import pytest
 from tests.host.lifecycle.states import AT, active, after, drive, found, way_to_active
 from tests.kit.clock import VirtualClock
 
-from nondum.host.core import effects, events
-from nondum.host.core.events import DriveRetried, Event, HostStable, RetryAsked, TrialDue
-from nondum.host.core.records import Moment, Safety, Snapshot, Step
+from nondum.host.core import effects
+from nondum.host.core.events.daemon import HostStable, HostStarted, SafeModeLeft, TrialDue
+from nondum.host.core.events.drives import DriveRead, DriveRetried
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import PayloadCleared, RetryAsked
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution, safe_mode
 from nondum.host.lifecycle.advance import advance
@@ -33,7 +39,7 @@ def died(state: HostState, times: int = 1) -> HostState:
     for _ in range(times):
         state = recover(state, AT).state
         if all(p.step is not Step.QUARANTINED for p in state.payloads.values()):
-            state = on(state, drive(), events.DriveRead("a", ("k1",)), *way_to_active()[5:])
+            state = on(state, drive(), DriveRead("a", ("k1",)), *way_to_active()[5:])
     return state
 
 
@@ -41,7 +47,7 @@ def left_alone() -> HostState:
     """A payload that five daemons died at."""
     state = died(active(), ATTEMPTS)
     assert state.payloads["k1"].step is Step.QUARANTINED
-    return on(state, drive(), events.DriveRead("a", ("k1",)))
+    return on(state, drive(), DriveRead("a", ("k1",)))
 
 
 def test_payload_is_tried_once_and_is_well_if_the_daemon_lives() -> None:
@@ -55,7 +61,7 @@ def test_payload_is_tried_once_and_is_well_if_the_daemon_lives() -> None:
 def test_payload_that_kills_its_trial_is_left_to_people() -> None:
     before = left_alone()
     tried = on(before, DUE)
-    state = on(died(tried), drive(), events.DriveRead("a", ("k1",)))
+    state = on(died(tried), drive(), DriveRead("a", ("k1",)))
     assert state.payloads["k1"].step is Step.QUARANTINED
     (foretold,), (untried,) = before.payloads["k1"].problems, state.payloads["k1"].problems
     assert (foretold.code, untried.code) == ("QUARANTINED", "QUARANTINED")
@@ -86,13 +92,13 @@ def test_drive_has_a_trial_too() -> None:
     for why in (DUE, DriveRetried("a")):
         again, done = after(why, state=state)
         assert any(isinstance(effect, effects.ReadDrive) for effect in done)
-        assert not on(again, events.DriveRead("a", ())).tries
+        assert not on(again, DriveRead("a", ())).tries
 
 
 def test_payload_of_a_drive_that_was_refused_comes_in_with_its_trial() -> None:
     state = on(HostState("spot", tries={"k1": ATTEMPTS}), drive(), found())
     assert state.payloads["k1"].step is Step.REFUSED
-    state = on(state, DUE, events.PayloadCleared("k1"), found())
+    state = on(state, DUE, PayloadCleared("k1"), found())
     assert state.payloads["k1"].step is Step.RECEIVED
 
 
@@ -116,7 +122,7 @@ class Daemon:
     def __init__(self, state: Path, asked: Safety = Safety.OFF) -> None:
         self.counter = CrashCounter(state)
         self.safety, _ = self.counter.begin(asked)
-        self.counter.on_event(events.HostStarted("spot"))
+        self.counter.on_event(HostStarted("spot"))
         self.emitted: list[type[Event]] = []
         self.emits = asyncio.Event()
 
@@ -160,7 +166,7 @@ async def test_safe_mode_is_left_after_an_hour_and_the_next_death_leads_back(
     await clock.advance_until(tasks[0], step_s=SOON_S)
     await clock.advance(begun_s + AFTER_S - 1 - clock.time())
     await clock.advance_until(daemon.emits.wait(), step_s=1.0)
-    assert daemon.emitted == [events.SafeModeLeft]
+    assert daemon.emitted == [SafeModeLeft]
     for task in tasks:
         task.cancel()
     assert CrashCounter(tmp_path).begin()[0] is Safety.INITIAL

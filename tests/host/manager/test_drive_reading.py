@@ -17,14 +17,9 @@ from tests.kit.payloads import Part, make_payload
 
 from nondum.host.core import payload_key
 from nondum.host.core.effects import ReadDrive, ReleaseDrive
-from nondum.host.core.events import (
-    DriveFlapping,
-    DriveInserted,
-    DriveRead,
-    PayloadFound,
-    WheelsStored,
-)
-from nondum.host.core.records import Step
+from nondum.host.core.events.drives import DriveFlapping, DriveInserted, DriveRead
+from nondum.host.core.events.payloads import PayloadFound, WheelsStored
+from nondum.host.core.records.step import Step
 from nondum.host.jobs.children import Children
 from nondum.host.manager import drive_reading
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.payloads import Part, make_payload
 
-from nondum.host.core import events
-from nondum.host.core.records import Step
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.step import Step
 from nondum.host.jobs.install import install
 from nondum.host.manager.headroom import Needs, used_mb
 from nondum.host.manager.memory_reservations import total
@@ -63,7 +63,7 @@ async def test_second_payload_that_counts_on_the_same_memory_is_refused(tmp_path
         assert is_at(host, FIRST, Step.ACTIVE)
         host.pull("a")
         await host.until_gone(FIRST)
-        host.bus.emit(events.RetryAsked(refused.key))
+        host.bus.emit(RetryAsked(refused.key))
         await host.until(lambda: is_at(host, SECOND, Step.ACTIVE))
 
 

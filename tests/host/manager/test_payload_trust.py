@@ -23,10 +23,12 @@ from tests.host.trust.trusted import (
     until_read,
     with_trust,
 )
+from tests.kit.golden import Golden
 from tests.kit.signing import Key, sign_payload, signed
 
-from nondum.host.core.events import PayloadFound, TrustChanged, TrustFileRefused, TrustRead
-from nondum.host.core.records import Step
+from nondum.host.core.events.payloads import PayloadFound
+from nondum.host.core.events.trust import TrustChanged, TrustFileRefused, TrustRead
+from nondum.host.core.records.step import Step
 from nondum.host.trust.anchors import Origin
 from nondum.sdk.errors import TrustRefused
 from nondum.wheelhouse.trust import trust_file
@@ -80,9 +82,10 @@ async def test_what_is_wrong_or_doubtful_is_told_as_a_drive_is_read(tmp_path: Pa
         assert [event.problems[0].code for event in files] == ["TOO_LARGE"]
 
 
-async def test_a_host_that_trusts_no_key_runs_nothing(tmp_path: Path) -> None:
+async def test_a_host_that_trusts_no_key_runs_nothing(tmp_path: Path, golden: Golden) -> None:
     async with trusting(tmp_path, None) as host:
-        assert "trusts no key" in host.executor.trust.warnings[0]
+        [warning] = host.executor.trust.warnings
+        golden.check("the host trusts no key", warning)
         drive = with_trust(lamp(tmp_path / "drive", ALICE), signed(FIRST, ROOT))
         host.plug(drive)
         assert await refusal(host) == ["SIG_UNTRUSTED"]

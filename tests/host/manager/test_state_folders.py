@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.manager.state_folders import (
     Folders,

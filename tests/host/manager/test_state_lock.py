@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 from tests.faults.fuse import served
 from tests.kit.clock import VirtualClock
+from tests.kit.golden import Golden
 from tests.kit.until import until
 
 from nondum.host.manager import state_lock
@@ -142,7 +143,7 @@ async def test_child_that_has_not_executed_yet_has_no_lock(
 
 
 async def test_daemon_that_ends_is_waited_for_and_named(
-    tmp_path: Path, clock: VirtualClock
+    tmp_path: Path, clock: VirtualClock, golden: Golden
 ) -> None:
     waited: list[str] = []
     with daemon(tmp_path) as ending:
@@ -150,7 +151,8 @@ async def test_daemon_that_ends_is_waited_for_and_named(
         assert ending.hear() == "ending"
         locking = asyncio.create_task(state_lock.lock(tmp_path, waited.append))
         await clock.advance(ENDING_S / 2)
-        assert waited == [f"waiting for {ending.name} to end: it still uses {tmp_path}"]
+        [said] = waited
+        golden.check("another daemon is ending", said, daemon=ending.name, state=tmp_path)
         assert not locking.done()
         ending.kill()
         await clock.advance(LOOK_S)

@@ -12,21 +12,13 @@ from typing import Any
 
 from tests.kit.until import arrived
 
-from nondum.host.core.events import (
-    BehaviourEnded,
-    BehaviourEstablished,
-    Event,
-    FactForgotten,
-    FactKnown,
-    StreamFlowing,
-)
-from nondum.host.core.records import (
-    ComponentRecord,
-    ComponentState,
-    FormerPayload,
-    MountPose,
-    Snapshot,
-)
+from nondum.host.core.events.behaviours import BehaviourEnded, BehaviourEstablished
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.payload import FormerPayload
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.frames import mounts_of_all
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.mounts import MountUpdates
@@ -243,7 +235,12 @@ class Robot:
         await self.until(lambda: self.mind.queue[id].state.value == state)
 
     async def until_holding(self, id: str = "1") -> None:
-        await self.until(lambda: self.mind.queue[id].reason == "it holds and is kept so")
+        await self.until(lambda: self.holds(id))
+
+    def holds(self, id: str) -> bool:
+        """Whether a goal is kept so now."""
+        rows = (row for row in self.mind.views.given() if row["id"] == id)
+        return any(row["holds"] and row["state"] == "active" for row in rows)
 
     @property
     def running(self) -> set[str]:

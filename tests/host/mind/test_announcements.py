@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tests.host.lifecycle.states import component
+from tests.kit.golden import Golden
 
-from nondum.host.core.records import Snapshot
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.announcements import (
     MAX_CHARACTERS,
     MAX_SENTENCES,
@@ -39,16 +40,20 @@ def test_sentence_without_end_is_cut() -> None:
     assert cut.text == "y" * MAX_CHARACTERS + "…"
 
 
-def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anything() -> None:
+def test_component_that_waits_for_its_device_is_not_said_to_be_able_to_do_anything(
+    golden: Golden,
+) -> None:
     waiting = component("eye", need="0403")
     served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
     before, after = (
         compose(Snapshot("spot", revision, components=(one,)))
         for revision, one in enumerate((waiting, served))
     )
-    assert recomposed(None, before) == ["eye waits for its device port"]
-    assert recomposed(before, after) == ["eye is ready"]
-    assert recomposed(after, before) == ["eye waits for its device port"]
+    [waits] = recomposed(None, before)
+    golden.check("a component waits for its device", waits)
+    [ready] = recomposed(before, after)
+    golden.check("the device is there", ready)
+    assert recomposed(after, before) == [waits]
 
 
 def test_what_was_told_of_a_component_that_is_kept_out_is_over_when_it_is_not_any_more() -> None:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from nondum.host.core.records import MountPose
+from nondum.host.core.records.mount import MountPose
 from nondum.host.mind.frames import frame_tree, mount_warnings, mounts_to_wire
 from nondum.sdk.geometry import FrameTree
 from nondum.sdk.messages import Bearing, Header

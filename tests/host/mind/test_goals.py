@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from tests.kit.golden import Golden
 
-from nondum.host.core.records import GoalRecord
+from nondum.host.core.records.goal import GoalRecord
 from nondum.host.mind.goals import GoalQueue, GoalState
 from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.errors import GoalRefused
@@ -69,19 +70,21 @@ def test_suspended_goal_keeps_its_place(queue: GoalQueue) -> None:
     assert [goal.id for goal in queue.open()] == ["1", "2"]
 
 
-def test_newer_goal_to_maintain_replaces_an_older_one_that_is_in_its_way(queue: GoalQueue) -> None:
+def test_newer_goal_to_maintain_replaces_an_older_one_that_is_in_its_way(
+    queue: GoalQueue, golden: Golden
+) -> None:
     old, new = give(queue, "maintain"), give(queue, "maintain")
     queue.put_aside(old, new, "the base")
     assert queue[old].state is GoalState.HALTED
-    assert queue[old].reason == "replaced by goal 2"
+    golden.check("a newer goal is in its way", queue[old].reason, new=new)
 
 
-def test_goal_put_aside_waits_its_turn_and_tells_for_what(queue: GoalQueue) -> None:
+def test_goal_put_aside_waits_its_turn_and_tells_for_what(queue: GoalQueue, golden: Golden) -> None:
     old, new = give(queue, "maintain"), give(queue, priority=1)
     queue.put(old, GoalState.ACTIVE)
     queue.put_aside(old, new, "the base")
     assert queue[old].state is GoalState.QUEUED
-    assert queue[old].reason == "waits for goal 2: both need the base"
+    golden.check("a more urgent goal needs the same", queue[old].reason, new=new)
 
 
 def test_what_is_over_stays_over(queue: GoalQueue) -> None:

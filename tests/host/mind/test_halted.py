@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import pytest
 from tests.host.mind.robot import HOST, Robot
+from tests.kit.golden import Golden
 from tests.planning.strangers import (
     MOBILE_BASE,
     PEOPLE_DETECTOR,
@@ -14,7 +15,7 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.core.events import BehavioursHalted
+from nondum.host.core.events.behaviours import BehavioursHalted
 from nondum.planning.execute.running import RunState
 
 pytestmark = pytest.mark.anyio
@@ -34,14 +35,15 @@ def schemas(actions: Iterable[str]) -> set[str]:
     return {action.split(" ")[0] for action in actions}
 
 
-async def test_pulled_camera_takes_all_down_in_one_tick(robot: Robot) -> None:
+async def test_pulled_camera_takes_all_down_in_one_tick(robot: Robot, golden: Golden) -> None:
     await follow(robot)
     assert not told(robot)
     robot.unplug("recorded-camera")
     await robot.until(lambda: not robot.running)
     (halts,) = told(robot)
     assert schemas(halts.lost) == {"recorded-camera.stream"}
-    assert set(halts.lost.values()) == {"its component is gone"}
+    [why] = set(halts.lost.values())
+    golden.check("the component is pulled", why)
     assert schemas(halts.halted) == {
         "people-detector.detect",
         "visual-tracker.track",
@@ -71,11 +73,12 @@ async def test_finished_work_is_not_told(robot: Robot) -> None:
     assert not any(halts.lost for halts in told(robot))
 
 
-async def test_halting_by_a_person_is_told_once(robot: Robot) -> None:
+async def test_halting_by_a_person_is_told_once(robot: Robot, golden: Golden) -> None:
     await follow(robot)
     robot.mind.halt()
     await robot.until(lambda: not robot.running)
     await robot.until(lambda: bool(told(robot)))
     (halts,) = told(robot)
-    assert set(halts.halted.values()) == {"halted by a person"}
+    [why] = set(halts.halted.values())
+    golden.check("a person halts", why)
     assert len(halts.halted) == 4

@@ -15,7 +15,7 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.core.records import MountPose
+from nondum.host.core.records.mount import MountPose
 from nondum.sdk.description import PluginDescription
 
 pytestmark = pytest.mark.anyio

@@ -255,7 +255,7 @@ async def test_planner_for_which_no_descriptor_is_left_leaves_the_search_to_anot
         alone = await Planners([late]).plan(task, 5.0)
         found = await Planners([others, late]).plan(task, 5.0)
     assert isinstance(alone.answer, GaveUp)
-    assert "PLANNER_START planner pyperplan: it does not start" in alone.answer.why
+    assert "PLANNER_START planner pyperplan: " in alone.answer.why
     assert isinstance(found.answer, Plan)
     assert found.planner == "native"
     assert not (tmp_path / "planning/pyperplan").exists()

@@ -6,7 +6,7 @@ import pytest
 from tests.host.mind.robot import HOST, Robot
 from tests.planning.strangers import COMPTON_CAMERA
 
-from nondum.host.core.events import GoalReached
+from nondum.host.core.events.goals import GoalReached
 from nondum.planning.merge.goal import GoalKind
 
 pytestmark = pytest.mark.anyio
@@ -63,8 +63,9 @@ async def test_same_question_asked_twice_at_once_is_answered_twice(robot: Robot)
 
 async def test_answer_of_a_behaviour_is_told_and_kept_with_its_goal(robot: Robot) -> None:
     robot.plug(COMPTON_CAMERA)
-    robot.answers["compton-camera.localise"] = "it is 40 degrees to the left"
+    answer = "it is 40 degrees to the left"
+    robot.answers["compton-camera.localise"] = answer
     given = robot.mind.give(pddl=LOCALISE, kind="do", said="where is the source")
     await robot.until_goal("reached", given.id)
-    assert robot.mind.queue[given.id].reason == "it is 40 degrees to the left"
-    assert "where is the source: it is 40 degrees to the left" in robot.told
+    assert robot.mind.queue[given.id].reason == answer
+    assert f"where is the source: {answer}" in robot.told

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from tests.host.mind.robot import Robot
+from tests.kit.golden import Golden
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
 from nondum.host.people.conversation import Conversation, wanted
@@ -44,9 +45,9 @@ async def test_answer_is_not_told_twice(robot: Robot) -> None:
     assert told(robot) == before
 
 
-async def test_spoken_goal_says_which_one_it_replaces(robot: Robot) -> None:
+async def test_spoken_goal_says_which_one_it_replaces(robot: Robot, golden: Golden) -> None:
     sensing = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
     phrases = tuple(replace(b, phrases=("point at {t}",)) for b in PAN_TILT_UNIT.behaviours)
     robot.plug(sensing, replace(PAN_TILT_UNIT, behaviours=phrases))
-    assert wanted(robot.mind, WORDS) == "that is goal 1"
-    assert f"goal 1, {WORDS!r}" in wanted(robot.mind, WORDS)
+    golden.check("a goal is spoken", wanted(robot.mind, WORDS))
+    golden.check("the same goal is spoken again", wanted(robot.mind, WORDS), words=WORDS)

@@ -11,6 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector
 from tests.host.mind.robot import Robot
+from tests.kit.golden import Golden
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
 from nondum.host.mind.planners import Planners
@@ -50,7 +51,7 @@ def released() -> Iterator[None]:
     Emergency.is_pressed = False
 
 
-async def test_parts_are_ticked_in_order(robot: Robot) -> None:
+async def test_parts_are_ticked_in_order(robot: Robot, golden: Golden) -> None:
     robot.plug(COMPTON_CAMERA)
     robot.mind.tick()
     view = robot.mind.views.tree()
@@ -61,15 +62,15 @@ async def test_parts_are_ticked_in_order(robot: Robot) -> None:
         "task",
         "people",
     ]
-    assert view["children"][3]["why"] == "nothing is asked for"
+    golden.check("there is no task", view["children"][3]["why"])
 
 
-async def test_world_model_counts_in_words_that_fit(robot: Robot) -> None:
+async def test_world_model_counts_in_words_that_fit(robot: Robot, golden: Golden) -> None:
     robot.plug()
     robot.mind.tick()
     counted = len(robot.mind.beliefs.world.facts)
     assert counted == 1
-    assert robot.mind.views.tree()["children"][1]["why"] == "1 fact holds"
+    golden.check("there is one fact", robot.mind.views.tree()["children"][1]["why"])
 
 
 async def test_integrators_guard_interrupts_the_task(released: None) -> None:

@@ -20,7 +20,7 @@ from tests.planning.strangers import (
     VISUAL_TRACKER,
 )
 
-from nondum.host.core.records import ComponentState
+from nondum.host.core.records.component import ComponentState
 from nondum.planning.execute.running import RunState
 from nondum.sdk.errors import GoalRefused
 

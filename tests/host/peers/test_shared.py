@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.peers.watcher import HEAD, component, merged_watcher, no_claims, snapshot
 
-from nondum.host.core.events import FactForgotten, FactKnown, StreamFlowing
-from nondum.host.core.records import DeviceClaim
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.records.device import DeviceClaim
 from nondum.host.peers import peer_entries
 from nondum.host.peers.offered_entries import Policy, catalogue_entries, changes, passing
 from nondum.host.peers.peer_entries import (

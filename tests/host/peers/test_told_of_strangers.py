@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from nondum.host.core.events import Event, PeerTurnedAway
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.peers import PeerTurnedAway
 from nondum.host.peers.rejected_hosts import RejectedHosts
 from nondum.transport.peers import HostKeys, PeerKey, Reason, Refusal
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.events import FactKnown
-from nondum.host.core.records import ComponentRecord, ComponentState, MountPose, Snapshot
+from nondum.host.core.events.facts import FactKnown
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.merge import merge

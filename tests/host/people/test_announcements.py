@@ -6,10 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.kit.golden import Golden
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
-from nondum.host.core.records import ComponentRecord, ComponentState, PayloadRecord, Snapshot, Step
+from nondum.host.core.events.drives import DriveInserted, DriveRead, DriveUnreadable
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    PayloadActivated,
+    PayloadFailed,
+    PayloadRefused,
+    PayloadWithdrawn,
+    WheelsStored,
+)
+from nondum.host.core.events.releases import BesideRefused, PayloadResumed, RollbackAsked
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.people.announcements import announced
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
@@ -26,57 +38,57 @@ LAMP = PayloadRecord(
     sources={},
     phases={},
 )
+GONE = "its drive was pulled"
 WRONG = (
     Problem("PYTHON_VERSION", "needs another Python", fix="use another payload"),
     Problem("DISK_FULL", "the disk is full", fix="free some"),
 )
 
 
+def said(event: Event, snapshot: Snapshot) -> str:
+    told = announced(event, snapshot)
+    assert told is not None
+    return told
+
+
 @pytest.mark.parametrize(
-    ("event", "said"),
+    ("situation", "event"),
     [
-        (
-            events.PayloadRefused(KEY, WRONG),
-            "org.example.lamp is refused: PYTHON_VERSION needs another Python → use another payload"
-            "; DISK_FULL the disk is full → free some",
-        ),
-        (
-            events.PayloadFailed(KEY, WRONG[1:]),
-            "org.example.lamp does not work: DISK_FULL the disk is full → free some",
-        ),
-        (
-            events.PayloadWithdrawn(KEY, "its drive was pulled"),
-            "org.example.lamp is withdrawn: its drive was pulled",
-        ),
-        (events.PayloadWithdrawn("1", "it left"), "payload 1 is withdrawn: it left"),
-        (
-            events.DriveUnreadable("a", WRONG[1:]),
-            "drive a cannot be used: DISK_FULL the disk is full → free some",
-        ),
-        (events.DriveRead("a", ()), "drive a carries no payload"),
-        (events.DriveRead("a", (KEY,)), None),
-        (events.DriveInserted("a", Path("/a"), "slot"), None),
+        ("a payload is refused", PayloadRefused(KEY, WRONG)),
+        ("a payload fails", PayloadFailed(KEY, WRONG[1:])),
+        ("a payload is withdrawn", PayloadWithdrawn(KEY, GONE)),
+        ("a payload that no record names is withdrawn", PayloadWithdrawn("1", "it left")),
+        ("a drive cannot be read", DriveUnreadable("a", WRONG[1:])),
+        ("a drive carries nothing", DriveRead("a", ())),
     ],
-    ids=lambda value: getattr(value, "name", None),
 )
-def test_event_is_said_in_a_sentence(event: Event, said: str | None) -> None:
-    assert announced(event, Snapshot("spot", revision=1, payloads=(LAMP,))) == said
+def test_event_is_said_in_a_sentence(situation: str, event: Event, golden: Golden) -> None:
+    golden.check(situation, said(event, Snapshot("spot", revision=1, payloads=(LAMP,))))
+
+
+@pytest.mark.parametrize(
+    "event",
+    [DriveRead("a", (KEY,)), DriveInserted("a", Path("/a"), "slot")],
+    ids=["a payload is found", "a drive is inserted"],
+)
+def test_event_that_another_follows_is_not_said(event: Event) -> None:
+    assert announced(event, Snapshot("spot", revision=1, payloads=(LAMP,))) is None
 
 
 def test_release_that_was_refused_unread_is_named_without_a_version() -> None:
     unread = replace(LAMP, key="3" * 16, digest="3" * 64, version="", release=0)
     snapshot = Snapshot("spot", revision=1, payloads=(LAMP, unread))
-    gone = events.PayloadWithdrawn(unread.key, "its drive was pulled")
-    assert announced(gone, snapshot) == "org.example.lamp is withdrawn: its drive was pulled"
+    alone = Snapshot("spot", revision=1, payloads=(LAMP,))
+    assert said(PayloadWithdrawn(unread.key, GONE), snapshot) == said(
+        PayloadWithdrawn(KEY, GONE), alone
+    )
 
 
-def test_payload_that_was_rebuilt_is_told_as_such_without_a_version() -> None:
+def test_payload_that_was_rebuilt_is_told_as_such_without_a_version(golden: Golden) -> None:
     rebuilt = replace(LAMP, key="3" * 16, digest="3" * 64, version="1.1", release=2)
     snapshot = Snapshot("spot", revision=1, payloads=(LAMP, rebuilt))
-    gone = events.PayloadWithdrawn(KEY, "it was built again in its place", rebuilt.key)
-    assert announced(gone, snapshot) == (
-        "org.example.lamp has changed on its drive, and is judged again"
-    )
+    gone = PayloadWithdrawn(KEY, "it was built again in its place", rebuilt.key)
+    golden.check("a payload is built again on its drive", said(gone, snapshot))
 
 
 OLD = replace(LAMP, step=Step.ACTIVE)
@@ -84,60 +96,54 @@ NEW = replace(LAMP, key="2" * 16, digest="2" * 64, version="2", release=2, step=
 
 
 @pytest.mark.parametrize(
-    ("event", "step", "said"),
+    ("situation", "event", "step"),
     [
+        ("another release is stored", WheelsStored(NEW.key, 1), Step.STORED),
         (
-            events.WheelsStored(NEW.key, 1),
-            Step.STORED,
-            "org.example.lamp 2 is being brought up beside 1",
-        ),
-        (events.WheelsStored(NEW.key, 1), Step.SUPERSEDED, None),
-        (
-            events.PayloadFailed(NEW.key, WRONG[1:]),
+            "another release fails",
+            PayloadFailed(NEW.key, WRONG[1:]),
             Step.QUARANTINED,
-            f"org.example.lamp 2 does not work, 1 (release 1) stays: {WRONG[1]}",
         ),
         (
-            events.PayloadWithdrawn(NEW.key, "its drive was pulled"),
+            "another release is withdrawn",
+            PayloadWithdrawn(NEW.key, GONE),
             Step.REMOVING,
-            "org.example.lamp 2 is withdrawn: its drive was pulled, 1 (release 1) stays",
         ),
         (
-            events.BesideRefused(NEW.key, "it runs alone"),
+            "another release runs alone",
+            BesideRefused(NEW.key, "it runs alone"),
             Step.STORED,
-            "org.example.lamp 2 takes the place of the release before it, not beside it: "
-            "it runs alone",
         ),
-        (
-            events.RollbackAsked(KEY, 1, 2),
-            Step.ACTIVE,
-            "a person goes back to org.example.lamp 1 (release 1) from release 2",
-        ),
+        ("a person goes back", RollbackAsked(KEY, 1, 2), Step.ACTIVE),
     ],
-    ids=lambda value: getattr(value, "name", None),
 )
-def test_release_is_told_beside_the_one_in_force(
-    event: Event, step: Step, said: str | None
+def test_release_is_told_beside_the_active_one(
+    situation: str, event: Event, step: Step, golden: Golden
 ) -> None:
     payloads = OLD, replace(NEW, step=step)
-    assert announced(event, Snapshot("spot", revision=1, payloads=payloads)) == said
+    golden.check(situation, said(event, Snapshot("spot", revision=1, payloads=payloads)))
 
 
-def test_takeover_and_return_are_told() -> None:
+def test_release_that_is_superseded_already_is_not_told() -> None:
+    payloads = OLD, replace(NEW, step=Step.SUPERSEDED)
+    snapshot = Snapshot("spot", revision=1, payloads=payloads)
+    assert announced(WheelsStored(NEW.key, 1), snapshot) is None
+
+
+def test_takeover_and_return_are_told(golden: Golden) -> None:
     new = replace(NEW, step=Step.ACTIVE, was=1)
     snapshot = Snapshot("spot", revision=2, payloads=(replace(OLD, step=Step.SUPERSEDED), new))
-    told = announced(events.PayloadActivated(new.key, ()), snapshot)
-    assert told == "org.example.lamp 2 (release 2) took over from release 1"
+    golden.check("a release takes over", said(PayloadActivated(new.key, ()), snapshot))
     lower = replace(new, version="0.9")
     snapshot = replace(snapshot, payloads=(snapshot.payloads[0], lower))
-    told = announced(events.PayloadActivated(new.key, ()), snapshot)
-    assert told is not None and told.endswith("though its version is lower: 1 was active")
+    told = said(PayloadActivated(new.key, ()), snapshot)
+    golden.check("a release of a lower version takes over", told)
     back = Snapshot("spot", revision=3, payloads=(replace(OLD, step=Step.STORED),))
-    told = announced(events.PayloadResumed(KEY, "the release that was active has stopped"), back)
-    assert told == ("org.example.lamp 1 comes back: the release that was active has stopped")
+    told = said(PayloadResumed(KEY, "the release that was active has stopped"), back)
+    golden.check("the release before comes back", told)
 
 
-def test_people_are_told_what_a_component_may_use() -> None:
+def test_people_are_told_what_a_component_may_use(golden: Golden) -> None:
     listener = ComponentRecord(
         *("listener", KEY, "org.example.lamp", "test-listener", "test_listener", "1"),
         ComponentState.READY,
@@ -147,7 +153,6 @@ def test_people_are_told_what_a_component_may_use() -> None:
         permissions=("network", "audio"),
     )
     lamp = replace(LAMP, step=Step.ACTIVE)
-    told = announced(
-        events.PayloadActivated(KEY, (listener,)), Snapshot("spot", revision=1, payloads=(lamp,))
-    )
-    assert told == "listener may use: audio, network"
+    snapshot = Snapshot("spot", revision=1, payloads=(lamp,))
+    told = said(PayloadActivated(KEY, (listener,)), snapshot)
+    golden.check("a component with permissions is active", told)

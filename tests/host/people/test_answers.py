@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.host.mind.robot import Robot
+from tests.kit.golden import Golden
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.core.records import ComponentState, DeviceClaim
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.device import DeviceClaim
 from nondum.host.mind.lack import Need
 from nondum.host.people.answering import Answering
 from nondum.host.people.answers import LONGEST, abilities, activity, of_the_robot
@@ -50,115 +52,107 @@ def answered(robot: Robot, coming: int = 0) -> str:
 
 
 @pytest.mark.anyio
-async def test_robot_says_what_it_can_do_and_what_it_lacks(robot: Robot) -> None:
-    assert answered(robot) == "I can do nothing yet: nothing is plugged in that knows words."
-    assert answered(robot, 2) == "I can do nothing yet: 2 payloads are being installed."
+async def test_robot_says_what_it_can_do_and_what_it_lacks(robot: Robot, golden: Golden) -> None:
+    golden.check("nothing is plugged in", answered(robot))
+    golden.check("nothing is plugged in, two payloads come", answered(robot, 2))
     robot.plug(POINTING)
-    assert answered(robot) == "I can do nothing now: to point at something I need a target."
+    golden.check("no target to point at", answered(robot))
     robot.plug(SENSING)
-    assert answered(robot) == f"I can {POINT}."
-    assert answered(robot, 1) == f"I can {POINT}; a payload is being installed."
+    able = answered(robot)
+    golden.check("can point", able, point=POINT)
+    golden.check("can point, a payload comes", answered(robot, 1), point=POINT)
     robot.set_state("pan-tilt-unit", ComponentState.RESTARTING)
-    await robot.until(lambda: POINT not in answered(robot) or "I need" in answered(robot))
-    assert answered(robot) == f"I can do nothing now: to {POINT} I need the head to be ready."
+    await robot.until(lambda: answered(robot) != able)
+    golden.check("the head is not ready", answered(robot), point=POINT)
 
 
 @pytest.mark.anyio
 async def test_component_that_waits_for_its_device_is_said_instead_of_what_it_lacks(
-    robot: Robot,
+    robot: Robot, golden: Golden
 ) -> None:
     answering = Answering(robot.mind, lambda: (), lambda: ())
-    waits = "pan-tilt-unit waits for its device head (then it can point)"
     robot.plug(POINTING)
     needs = (DeviceClaim("head", {"usb": "*:*"}, optional=False),)
     unit = replace(robot.components["pan-tilt-unit"], devices=needs)
     robot.components["pan-tilt-unit"] = unit
     robot.see()
     told = await answering.own("what can you do")
-    assert told == f"I can do nothing now: {waits}; to point at something I need a target."
+    golden.check("no device, no target", told or "")
     robot.plug(SENSING)  # now it is the device alone
-    assert await answering.own("what can you do") == f"I can do nothing now: {waits}."
+    told = await answering.own("what can you do")
+    golden.check("no device", told or "")
 
 
 @pytest.mark.anyio
-async def test_robot_says_what_it_does(robot: Robot) -> None:
+async def test_robot_says_what_it_does(robot: Robot, golden: Golden) -> None:
     def said() -> str:
         views = robot.mind.views
         return activity(views.given(), views.plan()["steps"])
 
-    assert said() == "I do nothing: no one has asked for anything."
+    golden.check("nothing was asked for", said())
     robot.plug(SENSING, POINTING)
     robot.mind.give(words=POINT)
-    assert said() == f"I was asked to {POINT}, and look for a way."
+    golden.check("a goal is planned for", said(), point=POINT)
     await robot.until_holding()
-    assert said() == f"I was asked to {POINT}, and I do, with pan-tilt-unit."
+    golden.check("a goal is kept", said(), point=POINT)
     robot.set_state("pan-tilt-unit", ComponentState.RESTARTING)
     await robot.until_goal("suspended")
-    assert said() == f"I was asked to {POINT}, but for that I need the head to be ready."
+    golden.check("a goal waits for the head", said(), point=POINT)
 
 
-def test_what_misses_the_same_is_said_once() -> None:
+def test_what_misses_the_same_is_said_once(golden: Golden) -> None:
     need = nothing_of("image")
     rows = [can("look for me", "cannot", need), can("follow me", "cannot", need), can("sing")]
-    assert abilities(rows) == "I can sing; to look for you and follow you I need an image."
+    golden.check("two of three miss the same", abilities(rows))
 
 
-def test_what_cannot_be_said_shortly_is_not_read_out() -> None:
+def test_what_cannot_be_said_shortly_is_not_read_out(golden: Golden) -> None:
     need = Need("WHY_CIRCLE", "whatever makes (dark c) true needs it first", "dark c")
-    assert (
-        abilities([can("sing"), can("dance", "cannot", need)]) == "I can sing; I cannot dance now."
-    )
+    told = abilities([can("sing"), can("dance", "cannot", need)])
+    golden.check("what is missing is hard to say", told)
     told = abilities([can("look at {i}", "cannot", nothing_of("image", "depth"))])
-    assert told == "I can do nothing now: to look at something I need an image or a depth."
+    golden.check("one of two types is missing", told)
 
 
-def test_what_means_two_things_or_is_not_known_is_not_promised() -> None:
+def test_what_means_two_things_or_is_not_known_is_not_promised(golden: Golden) -> None:
     rows = [can("sing", "ambiguous"), can("dance", "unknown"), can("greet <words>", "holds")]
-    assert abilities(rows) == "I can greet."
+    golden.check("only one of three can be promised", abilities(rows))
 
 
-def test_a_long_list_is_cut_to_what_can_be_spoken() -> None:
+def test_a_long_list_is_cut_to_what_can_be_spoken(golden: Golden) -> None:
     rows = [can(f"carry the box number {number} to the other side") for number in range(30)]
     told = abilities(rows)
     assert len(told) <= LONGEST
-    assert told.endswith(" and 27 things more.")
+    golden.check("thirty things can be done", told)
 
 
-def test_lent_components_and_payloads_that_come_are_told_beside() -> None:
-    assert activity([], [], {"eye"}) == "I do nothing of my own: eye runs for another host."
-    assert activity([], [], (), 2) == "I do nothing: 2 payloads are being installed."
+def test_lent_components_and_payloads_that_come_are_told_beside(golden: Golden) -> None:
+    golden.check("only a peer uses something", activity([], [], {"eye"}))
+    golden.check("nothing was asked for, two payloads come", activity([], [], (), 2))
     goals = [goal("sing", "queued"), goal("dance", "active", holds=True)]
-    assert activity(goals, [step("band@mule")], {"eye"}) == (
-        "I was asked to dance, and I do, with band; eye runs for another host; "
-        "1 more goal is waiting."
-    )
+    told = activity(goals, [step("band@mule")], {"eye"})
+    golden.check("a goal is kept, another waits, a peer uses something", told)
 
 
-def test_a_goal_that_is_worked_at_says_how_far_it_is() -> None:
+def test_a_goal_that_is_worked_at_says_how_far_it_is(golden: Golden) -> None:
     steps = [step("", "done"), step("base", "running")]
-    told = activity([goal("look for me", "active")], steps)
-    assert told == ("I was asked to look for you, and am at it, with base (1 of 2 steps done).")
+    golden.check("one of two steps is done", activity([goal("look for me", "active")], steps))
 
 
-def test_a_goal_in_pddl_is_not_turned_into_words() -> None:
+def test_a_goal_in_pddl_is_not_turned_into_words(golden: Golden) -> None:
     told = activity([goal("(lit rover)", "active", holds=True)], [])
-    assert told == "I was asked for (lit rover), and I do."
+    golden.check("a goal in PDDL is kept", told)
 
 
-def test_what_is_missing_is_told_by_data_whatever_the_sentences_say() -> None:
+def test_what_is_missing_is_told_by_data_whatever_the_sentences_say(golden: Golden) -> None:
     said = "(ready rover__gun__it) does not hold: gun waits for its device it"
     image = nothing_of("image", said=said)
-    assert (
-        abilities([can("look", "cannot", image)])
-        == "I can do nothing now: to look I need an image."
-    )
+    golden.check("nothing gives an image", abilities([can("look", "cannot", image)]))
     told = activity([goal("look", "suspended", said, image)], [])
-    assert told == "I was asked to look, but for that I need an image."
+    golden.check("a goal waits for an image", told)
     waits = Need("WHY_NOT_SO", "no power", "ready rover__gun__it", waits=True)
-    waiting = ["gun has no power"]
-    assert abilities([can("shoot", "cannot", waits)], 0, waiting) == (
-        "I can do nothing now: gun has no power."
-    )
+    told = abilities([can("shoot", "cannot", waits)], 0, ["gun has no power"])
+    golden.check("a component says why it waits", told)
 
 
 @given(st.text(), st.text(), st.lists(st.text(), max_size=8))
@@ -174,7 +168,6 @@ def test_whatever_strangers_write_an_answer_can_be_spoken(
     assert len(abilities(rows)) <= LONGEST
 
 
-def test_who_speaks_is_somebody_else() -> None:
-    assert of_the_robot("Tell me where my car is, and you yourself") == (
-        "Tell you where your car is, and me myself"
-    )
+def test_who_speaks_is_somebody_else(golden: Golden) -> None:
+    told = of_the_robot("Tell me where my car is, and you yourself")
+    golden.check("a sentence is said back", told)

@@ -7,9 +7,14 @@ from pathlib import Path
 
 import pytest
 from tests.host.lifecycle.states import active, component
+from tests.kit.golden import Golden
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
+from nondum.host.core.events.behaviours import BehaviourStarted
+from nondum.host.core.events.drives import DriveInserted
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.facts import FactKnown
+from nondum.host.core.events.payloads import PayloadActivated, PayloadRefused
+from nondum.host.core.events.workers import WorkerFailed, WorkerLogged
 from nondum.host.core.state import HostState
 from nondum.host.service.journal_messages import JournalMessages
 from nondum.sdk.errors import Problem
@@ -35,7 +40,7 @@ def fields(told: pytest.LogCaptureFixture) -> list[tuple[str, str]]:
 
 
 def test_refusal_is_found_by_payload_and_by_each_code(told: pytest.LogCaptureFixture) -> None:
-    tell(events.PayloadRefused("k1", (FULL, LATE, FULL)))
+    tell(PayloadRefused("k1", (FULL, LATE, FULL)))
     assert fields(told) == [
         ("NONDUM_EVENT", "PayloadRefused"),
         ("NONDUM_PAYLOAD", "org.x"),
@@ -47,31 +52,34 @@ def test_refusal_is_found_by_payload_and_by_each_code(told: pytest.LogCaptureFix
     assert "org.x is refused: DISK_FULL" in record.getMessage()
 
 
-def test_what_is_not_announced_is_logged_all_the_same(told: pytest.LogCaptureFixture) -> None:
-    tell(events.DriveInserted("sda1", Path("/mnt"), "block"))
+def test_what_is_not_announced_is_logged_all_the_same(
+    told: pytest.LogCaptureFixture, golden: Golden
+) -> None:
+    tell(DriveInserted("sda1", Path("/mnt"), "block"))
     assert ("NONDUM_DRIVE", "sda1") in fields(told)
     told.clear()
-    tell(events.PayloadActivated("k1", (component("eye"),)))
+    tell(PayloadActivated("k1", (component("eye"),)))
     (record,) = told.records
-    assert (record.levelno, record.getMessage()) == (logging.INFO, "at work: eye")
+    assert record.levelno == logging.INFO
+    golden.check("a payload is active", record.getMessage())
 
 
 def test_every_event_with_a_problem_is_told(told: pytest.LogCaptureFixture) -> None:
-    tell(events.WorkerFailed("eye", (LATE,)))
+    tell(WorkerFailed("eye", (LATE,)))
     assert fields(told)[1:] == [("NONDUM_COMPONENT", "eye"), ("NONDUM_CODE", "WORKER_HUNG")]
 
 
 def test_lines_of_plugins_are_logged_from_warnings_on(told: pytest.LogCaptureFixture) -> None:
     for level in ("info", "stdout", "log"):
-        tell(events.WorkerLogged("eye", level, "I see"))
+        tell(WorkerLogged("eye", level, "I see"))
     assert not told.records
-    tell(events.WorkerLogged("eye", "error", "I do not see"))
+    tell(WorkerLogged("eye", "error", "I do not see"))
     (record,) = told.records
     assert (record.levelno, record.getMessage()) == (logging.ERROR, "eye: I do not see")
     assert ("NONDUM_COMPONENT", "eye") in fields(told)
 
 
 def test_what_happens_all_the_time_is_not_told(told: pytest.LogCaptureFixture) -> None:
-    tell(events.FactKnown("eye", "seen", ("spot",)))
-    tell(events.BehaviourStarted("eye", "look", 1))
+    tell(FactKnown("eye", "seen", ("spot",)))
+    tell(BehaviourStarted("eye", "look", 1))
     assert not told.records

@@ -43,7 +43,8 @@ DAEMON = """
 import asyncio, gc, os, signal, sys
 from pathlib import Path
 from nondum.host.app import run_host
-from nondum.host.config.host_config import load, user_config
+from nondum.host.config.host_config import user_config
+from nondum.host.config.parsing import load
 
 class Looker:
     kind = "looker"

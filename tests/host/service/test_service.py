@@ -19,7 +19,7 @@ from tests.kit.running_host import DAEMON, RunningHost, running, until_ended
 from tests.kit.until import until
 
 from nondum.host.core.bus import Bus
-from nondum.host.core.events import HostStarted
+from nondum.host.core.events.daemon import HostStarted
 from nondum.host.lifecycle.advance import RULES
 from nondum.host.manager import state_lock
 from nondum.host.manager.state_lock import Holder

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nondum.host.core.records import DriveRecord, DriveState, Moment, Safety, Snapshot
+from tests.kit.golden import Golden
+
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.service.words import words
 from nondum.sdk.errors import Problem
 
@@ -26,27 +31,28 @@ def told(*drives: DriveRecord, goals: tuple[dict[str, str], ...] = (), **more: o
     return words(Snapshot("spot", 1, drives=drives, safety=safety), goals, {})
 
 
-def test_host_with_nothing_says_so() -> None:
-    assert told() == "0 components at work"
+def test_host_with_nothing_says_so(golden: Golden) -> None:
+    golden.check("nothing is plugged in", told())
 
 
-def test_goals_are_told_by_what_becomes_of_them() -> None:
+def test_goals_are_told_by_what_becomes_of_them(golden: Golden) -> None:
     goals = (
         {"state": "active", "text": "follow me"},
         {"state": "suspended", "text": "point at it"},
         {"state": "reached", "text": "was long ago"},
     )
-    assert told(goals=goals) == ("0 components at work; does: follow me; cannot yet: point at it")
+    golden.check("one goal is active, one suspended", told(goals=goals))
 
 
-def test_first_problem_is_told_and_the_rest_is_counted() -> None:
+def test_first_problem_is_told_and_the_rest_is_counted(golden: Golden) -> None:
     full = Problem("DISK_FULL", "the disk is full", fix="free some")
-    assert "needs help: DISK_FULL the disk is full → free some" in told(drive(full))
-    assert told(drive(full), drive(full, id="sdb1")).endswith("(and 1 more)")
+    golden.check("a drive has a problem", told(drive(full)), problem=full)
+    two = told(drive(full), drive(full, id="sdb1"))
+    golden.check("two drives have problems", two, problem=full)
 
 
-def test_safe_mode_comes_first() -> None:
-    assert told(safety=Safety.INITIAL).startswith("safe mode; ")
+def test_safe_mode_comes_first(golden: Golden) -> None:
+    golden.check("safe mode", told(safety=Safety.INITIAL))
 
 
 def test_words_of_strangers_stay_on_the_line() -> None:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from tests.kit.golden import Golden
 from tests.kit.signing import Key, signed, trust_of
 
 from nondum.host.trust import anchors
@@ -102,13 +103,16 @@ def test_file_of_another_user_is_not_believed(anchor: Path) -> None:
 @pytest.mark.parametrize(
     ("suffix", "size"), [("", trust_file.MAX_BYTES), (".sig", sshsig.MAX_BYTES)]
 )
-def test_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
+def test_file_that_is_too_long_is_not_parsed(
+    anchor: Path, suffix: str, size: int, golden: Golden
+) -> None:
     """It was replaced on purpose."""
     anchor.with_name(anchor.name + suffix).write_bytes(b"\n" * (size + 1))
     with pytest.raises(TrustRefused) as refused:
         anchors.load(anchor)
     (problem,) = refused.value.problems
-    assert (problem.code, problem.fix) == ("TOO_LARGE", "put the genuine file there")
+    assert problem.code == "TOO_LARGE"
+    golden.check("the first trust file is too large", problem.fix)
 
 
 # Writing

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.kit.golden import Golden
 from tests.kit.lamp_drive import lamp, told
 from tests.kit.signing import Key, sign_payload, signed, trust_of
 
@@ -55,7 +56,9 @@ def test_chain_does_not_begin_with_a_file_that_is_signed_falsely(anchor: Path) -
 @pytest.mark.parametrize(
     ("suffix", "size"), [("", trust_file.MAX_BYTES), (".sig", sshsig.MAX_BYTES)]
 )
-def test_kept_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, size: int) -> None:
+def test_kept_file_that_is_too_long_is_not_parsed(
+    anchor: Path, suffix: str, size: int, golden: Golden
+) -> None:
     """A file that long was replaced on purpose."""
     kept = anchor.parent / "kept"
     kept.mkdir()
@@ -66,7 +69,7 @@ def test_kept_file_that_is_too_long_is_not_parsed(anchor: Path, suffix: str, siz
     path.write_bytes(b"\n" * (size + 1) + path.read_bytes())
     said = load(anchor)
     assert (said["text"], codes(said)) == (TEXT, ["TOO_LARGE"])
-    assert said["problems"][0]["fix"] == "put the genuine file there"
+    golden.check("a kept trust file is too large", said["problems"][0]["fix"])
 
 
 def test_next_version_is_kept_and_followed_only_if_its_roots_signed_it(

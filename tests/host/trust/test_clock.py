@@ -10,8 +10,9 @@ import pytest
 from tests.host.trust.trusted import FIRST
 from tests.kit.clock import VirtualClock
 
-from nondum.host.core.events import ClockDoubted, Event
-from nondum.host.core.records import Snapshot
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.trust import ClockDoubted
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.people.announcements import announced
 from nondum.host.trust.clock import LOOK_S, ClockWatch
 from nondum.wheelhouse.trust.judging import EARLIEST

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.core.events import PayloadFound
-from nondum.host.core.records import Moment
+from nondum.host.core.events.payloads import PayloadFound
+from nondum.host.core.records.moment import Moment
 from nondum.host.core.state import Highwater, HostState
 from nondum.host.lifecycle import admission
 from nondum.wheelhouse.format.signatures import Grant

@@ -9,7 +9,7 @@ from tests.kit.processes import is_alive
 from tests.kit.until import until_async
 from tests.kit.workers import TIMING, WorkersUnderTest
 
-from nondum.host.core.events import WorkerExited, WorkerStrained
+from nondum.host.core.events.workers import WorkerExited, WorkerStrained
 from nondum.host.workers.usage import UsageReader
 
 FORK = "while True:\n    try:\n        os.fork()\n    except OSError:\n        pass"

@@ -6,7 +6,7 @@ from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER
 from tests.kit.guest import do, guest_spec
 from tests.kit.workers import HOST, WorkersUnderTest, camera
 
-from nondum.host.core.events import WorkerLogged
+from nondum.host.core.events.workers import WorkerLogged
 from nondum.host.workers.spec import Limits
 from nondum.sdk.description import Unit
 

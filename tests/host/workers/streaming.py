@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.core.events import FactKnown
+from nondum.host.core.events.facts import FactKnown
 from nondum.sdk.description import Behaviour
 
 CAMERA = """

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,11 +16,11 @@ from tests.kit.processes import is_alive
 from tests.kit.watches import watches_left
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.core.events import WorkerLogged, WorkerReady
+from nondum.host.core.events.workers import WorkerLogged, WorkerReady
 from nondum.host.sandbox.cgroups.groups import Cgroups
-from nondum.host.workers.confinements import Unconfined
 from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import WorkerSpec
+from nondum.host.workers.unconfined import Unconfined
 from nondum.sdk.description import Label, PluginDescription
 from nondum.sdk.errors import WorkerFailed
 
@@ -83,14 +85,16 @@ async def test_nothing_importable_tells_what_is_missing(
     tested: WorkersUnderTest, tmp_path: Path
 ) -> None:
     spec = replace(tested.spec("guest", ""), site_packages=(tmp_path,))
-    with pytest.raises(WorkerFailed, match=r"WORKER_START_FAILED .*No module named 'nondum'"):
+    with pytest.raises(WorkerFailed, match=r"'nondum'") as failed:
         await tested.workers.start(spec)
+    assert failed.value.code == "WORKER_START_FAILED"
 
 
 async def test_missing_interpreter_is_told(tested: WorkersUnderTest, tmp_path: Path) -> None:
     spec = replace(tested.spec("guest", ""), python=tmp_path / "python")
-    with pytest.raises(WorkerFailed, match=r"LAUNCH_FAILED|No such file or directory"):
+    with pytest.raises(WorkerFailed) as failed:
         await tested.workers.start(spec)
+    assert failed.value.code in {"LAUNCH_FAILED", "WORKER_START_FAILED"}
 
 
 @pytest.mark.parametrize(
@@ -202,7 +206,7 @@ async def test_start_waits_for_the_one_that_is_being_stopped(tested: WorkersUnde
 
 async def test_second_worker_of_a_component_is_a_mistake(tested: WorkersUnderTest) -> None:
     spec = await tested.start("guest", "")
-    with pytest.raises(ValueError, match="has a worker already"):
+    with pytest.raises(ValueError, match="guest"):
         await tested.workers.start(spec)
 
 
@@ -229,7 +233,7 @@ async def test_worker_that_cannot_be_watched_leaves_nothing(
     with watches_left(watched), pytest.raises(WorkerFailed) as failed:
         await tested.workers.start(spec)
     assert failed.value.code == "LAUNCH_FAILED"
-    assert "No space left" in str(failed.value)
+    assert os.strerror(errno.ENOSPC) in str(failed.value)
     assert not is_alive(spare)
     assert not tree.names()
     assert not open_descriptors() - before
@@ -243,4 +247,4 @@ async def test_worker_for_which_no_link_can_be_made_fails_to_start(
     with descriptors_left(0), pytest.raises(WorkerFailed) as failed:
         await tested.workers.start(spec)
     assert failed.value.code == "LAUNCH_FAILED"
-    assert "Too many open files" in str(failed.value)
+    assert os.strerror(errno.EMFILE) in str(failed.value)

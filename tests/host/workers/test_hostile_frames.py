@@ -19,7 +19,8 @@ from tests.kit.guest import do, guest_spec
 from tests.kit.until import arrived
 from tests.kit.workers import HOST, TIMING, WorkersUnderTest
 
-from nondum.host.core.events import Event, WorkerLogged, WorkerReady
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.workers import WorkerLogged, WorkerReady
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import WorkerSpec
 from nondum.host.workers.workers import Workers

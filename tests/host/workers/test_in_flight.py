@@ -14,7 +14,7 @@ from tests.host.workers.flooding import fills_and_streams
 from tests.host.workers.streaming import sees
 from tests.kit.workers import LIBRARIES, SDK, TIMING, WorkersUnderTest, confinement_state, level
 
-from nondum.host.core.events import WorkerExited, WorkerReady
+from nondum.host.core.events.workers import WorkerExited, WorkerReady
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.workers import confinement_choice
 from nondum.host.workers.in_flight import culprit, sent

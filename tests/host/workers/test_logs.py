@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from nondum.host.core.records import Moment
+from nondum.host.core.records.moment import Moment
 from nondum.host.workers.logs import LINES, LogLine, Logs
 
 pytestmark = pytest.mark.anyio

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.core.events import (
-    FactForgotten,
-    FactKnown,
-    StreamFlowing,
-    WorkerFaulted,
-    WorkerLogged,
-)
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.events.workers import WorkerFaulted, WorkerLogged
 from nondum.host.workers.news import (
+    MAX_CLAIMED_BYTES,
     MAX_CLAIMS,
     MAX_TEXT,
     Claims,
@@ -119,7 +116,7 @@ def test_wrong_value_of_a_fact_names_the_predicate(
     with pytest.raises(MessageInvalid) as wrong:
         parse_news("guest", (), "know", {**FACT, "value": value}, types)
     assert wrong.value.code == code
-    assert "value of p " in wrong.value.problems[0].message
+    assert re.search(r"\bp\b", wrong.value.problems[0].message)
 
 
 def test_value_of_the_declared_type_is_taken() -> None:
@@ -167,7 +164,7 @@ def test_claims_are_bounded() -> None:
 
 def test_what_claims_take_is_bounded() -> None:
     claims = Claims()
-    with pytest.raises(ProtocolViolation, match="the values of a worker's facts"):
+    with pytest.raises(ProtocolViolation, match=f"EVENT_INVALID .*{MAX_CLAIMED_BYTES}"):
         for number in range(MAX_CLAIMS):
             claims.take(FactKnown("g", "p", (str(number),), "x" * 10_000))
 

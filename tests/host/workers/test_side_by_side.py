@@ -9,7 +9,9 @@ import pytest
 from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.core.events import FactKnown, TrialFailed, WorkerExited, WorkerReady
+from nondum.host.core.events.facts import FactKnown
+from nondum.host.core.events.releases import TrialFailed
+from nondum.host.core.events.workers import WorkerExited, WorkerReady
 from nondum.host.workers.spec import WorkerSpec
 from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Unit

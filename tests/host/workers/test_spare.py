@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import resource
 import signal
@@ -23,11 +24,12 @@ from tests.kit.workers import SDK, WorkersUnderTest
 from nondum.host.sandbox.cgroups.groups import Cgroups, NoTree
 from nondum.host.sandbox.inside.bootstrap import PRELOADED
 from nondum.host.sandbox.levels.bubblewrap import Ground
-from nondum.host.workers.confinements import Entry, Unconfined
+from nondum.host.workers.confinement import Entry
 from nondum.host.workers.launcher import MARK, WorkerLauncher, owner_mark
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.spare import OWNER, Spare
 from nondum.host.workers.spec import WorkerSpec, base_interpreter
+from nondum.host.workers.unconfined import Unconfined
 from nondum.sdk.errors import WorkerFailed
 
 pytestmark = pytest.mark.anyio
@@ -159,7 +161,7 @@ async def test_a_worker_that_cannot_be_watched_is_ended(tested: WorkersUnderTest
     with ours, theirs, no_descriptors_left(), pytest.raises(WorkerFailed) as failed:
         await launcher.launch(spec, theirs)
     assert failed.value.code == "LAUNCH_FAILED"
-    assert "Too many open files" in str(failed.value)
+    assert os.strerror(errno.EMFILE) in str(failed.value)
     assert not is_alive(spare)
 
 

@@ -11,7 +11,8 @@ import pytest
 from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.core.events import BehaviourEstablished, StreamFlowing
+from nondum.host.core.events.behaviours import BehaviourEstablished
+from nondum.host.core.events.facts import StreamFlowing
 from nondum.host.workers.call import Call
 from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Input, Output, Unit

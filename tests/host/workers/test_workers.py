@@ -8,15 +8,13 @@ import pytest
 from tests.kit.processes import is_alive
 from tests.kit.workers import HOST, WorkersUnderTest
 
-from nondum.host.core.events import (
+from nondum.host.core.events.behaviours import (
     BehaviourEnded,
     BehaviourEstablished,
     BehaviourProgressed,
-    FactForgotten,
-    FactKnown,
-    WorkerLogged,
-    WorkerReady,
 )
+from nondum.host.core.events.facts import FactForgotten, FactKnown
+from nondum.host.core.events.workers import WorkerLogged, WorkerReady
 from nondum.planning.execute.running import RunState
 from nondum.sdk.description import Behaviour, Unit
 from nondum.sdk.errors import WorkerFailed

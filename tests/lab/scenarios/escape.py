@@ -18,7 +18,7 @@ PLACE = "/var/lib/checkout"
 PROGRAM = """
 import asyncio, json, shutil
 from tests.sandbox.table import column
-from nondum.host.workers.confinements import Boxed
+from nondum.host.workers.boxed import Boxed
 
 print(json.dumps(asyncio.run(column(Boxed(shutil.which("bwrap"))))))
 """

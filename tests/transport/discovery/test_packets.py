@@ -6,10 +6,12 @@ import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit import version_before
 
 from nondum.sdk.errors import ProtocolViolation
 from nondum.transport.discovery import Announcement, packets
-from nondum.transport.discovery.hint import to_txt
+from nondum.transport.discovery.hint import Source, from_txt, to_txt
+from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import HostKeys
 
 KEY = HostKeys.generate().public
@@ -27,6 +29,16 @@ def test_an_answer_says_what_was_announced(nonce: bytes) -> None:
     answer = packets.read_answer(packets.answer(asked, LONGEST))
     assert (answer.nonce, answer.port) == (nonce, 65_535)
     assert answer.txt == to_txt(LONGEST)
+
+
+def test_hosts_of_the_version_before_find_and_are_found() -> None:
+    (question,), (answer,) = map(version_before.packets, ("question", "answer"))
+    nonce = bytes(range(packets.NONCE))
+    assert packets.nonce_of(question) == nonce
+    found = packets.read_answer(answer)
+    security = Security.DEVELOPMENT
+    hint = from_txt(found.txt, found.port, ["127.0.0.1"], source=Source.STATIC, security=security)
+    assert (found.nonce, hint.name, hint.versions) == (nonce, "before", (1,))
 
 
 @given(nonces)

@@ -76,6 +76,58 @@ messages: st.SearchStrategy[Message] = st.one_of(
 )
 
 
+SAID = Problem("CODE", "what happened", where="there", need="n", have="h", fix="f")
+
+
+@pytest.mark.parametrize(
+    ("message", "encoded"),
+    [
+        (
+            Hello((2, 1), "rover", "key", 5, 1, b"cert"),
+            b"\x97\x00\x92\x02\x01\xa5rover\xa3key\x05\x01\xc4\x04cert",
+        ),
+        (
+            Welcome(Hello((2,), "lamp", "yek", 6, 2, b"")),
+            b"\x97\x01\x91\x02\xa4lamp\xa3yek\x06\x02\xc4\x00",
+        ),
+        (
+            Refused(SAID),
+            b"\x92\x02\x86\xa4code\xa4CODE\xa7message\xadwhat happened\xa5where\xa5there"
+            b"\xa4need\xa1n\xa4have\xa1h\xa3fix\xa1f",
+        ),
+        (
+            Request(7, 3, 1500, "behave", {"a": 1}),
+            b"\x96\x03\x07\x03\xcd\x05\xdc\xa6behave\x81\xa1a\x01",
+        ),
+        (Reply(7, {}), b"\x93\x04\x07\x80"),
+        (
+            Failure(7, (Problem("CODE", "m"), Problem("CODE", "m", fix="f"))),
+            b"\x93\x05\x07\x92\x82\xa4code\xa4CODE\xa7message\xa1m"
+            b"\x83\xa4code\xa4CODE\xa7message\xa1m\xa3fix\xa1f",
+        ),
+        (
+            Progress(7, {"done": 0.5}),
+            b"\x93\x06\x07\x81\xa4done\xcb?\xe0\x00\x00\x00\x00\x00\x00",
+        ),
+        (Cancel(7), b"\x92\x07\x07"),
+        (Notice("news", {"b": []}), b"\x93\x08\xa4news\x81\xa1b\x90"),
+        (Ping(4), b"\x93\t\x04\xcd\x01,"),
+        (
+            Ping(4, 250, State(9, bytes(range(8)))),
+            b"\x95\t\x04\xcc\xfa\t\xc4\x08\x00\x01\x02\x03\x04\x05\x06\x07",
+        ),
+        (Pong(4), b"\x92\n\x04"),
+        (Bye("end"), b"\x92\x0b\xa3end"),
+        (Ask(2, "key"), b"\x93\x0c\x02\xa3key"),
+        (Vouch(2), b"\x92\r\x02"),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_bytes_are_those_that_other_versions_read(message: Message, encoded: bytes) -> None:
+    assert encode(message) == encoded
+    assert decode(encoded) == message
+
+
 @given(messages)
 def test_message_survives_the_wire(message: Message) -> None:
     assert decode(encode(message)) == message

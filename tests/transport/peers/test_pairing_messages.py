@@ -9,34 +9,36 @@ import pytest
 from nondum.sdk.errors import NondumError
 from nondum.sdk.wire import pack
 from nondum.transport.peers import PeerKey
-from nondum.transport.peers.pairing import NONCE_BYTES, Agreed, Ask, Commit, Nonce
-from nondum.transport.peers.pairing_messages import (
+from nondum.transport.peers.pairing import (
     HASH_BYTES,
-    Beat,
-    Ended,
-    Ending,
-    Said,
-    decode,
-    encode,
+    NONCE_BYTES,
+    Agreed,
+    Ask,
+    Commit,
+    Nonce,
 )
+from nondum.transport.peers.pairing_messages import Beat, Ended, Ending, Said, decode, encode
 
 KEY = PeerKey("rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7")
 HASH, NONCE = bytes(HASH_BYTES), bytes(NONCE_BYTES)
+PACKED_KEY = b"\xd9(" + KEY.encode()
 
 
 @pytest.mark.parametrize(
-    "said",
+    ("said", "encoded"),
     [
-        Ask(KEY, "rover"),
-        Commit(KEY, "rover", HASH),
-        Nonce(NONCE),
-        Agreed(HASH),
-        *map(Ended, Ending),
-        Beat(),
+        (Ask(KEY, "rover"), b"\x93\x00" + PACKED_KEY + b"\xa5rover"),
+        (Commit(KEY, "lamp", HASH), b"\x94\x01" + PACKED_KEY + b"\xa4lamp\xc4\x20" + HASH),
+        (Nonce(NONCE), b"\x92\x02\xc4\x10" + NONCE),
+        (Agreed(HASH), b"\x92\x03\xc4\x20" + HASH),
+        *((Ended(why), b"\x92\x04" + pack(why.value)) for why in Ending),
+        (Beat(), b"\x91\x05"),
     ],
+    ids=str,
 )
-def test_message_survives_the_wire(said: Said) -> None:
-    assert decode(encode(said)) == said
+def test_bytes_are_those_that_other_versions_read(said: Said, encoded: bytes) -> None:
+    assert encode(said) == encoded
+    assert decode(encoded) == said
 
 
 @pytest.mark.parametrize(

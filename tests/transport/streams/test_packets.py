@@ -7,6 +7,7 @@ import contextlib
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kit import version_before
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire import pack
@@ -53,6 +54,18 @@ def test_what_a_reader_says_survives(message: Asked) -> None:
 @given(TOLD)
 def test_what_an_owner_says_survives(message: Opened | Pong | Over) -> None:
     assert packets.read_told([packets.told(message)]) == message
+
+
+def test_bridge_of_the_version_before_is_understood() -> None:
+    asked = {"claim": Claim(1, "token"), "handled": Handled(2), "ping": Ping(1.5)}
+    for name, message in asked.items():
+        assert packets.read_asked(*version_before.packets(name)) == message
+    over = Over(Problem("STREAM_GONE", "it has ended"))
+    frame = Frame(2, Coding.RAW, {"width": 2, "height": 1}, b"ab")
+    told = {"opened": Opened("text"), "pong": Pong(1.5, 2.5), "over": over, "frame": frame}
+    for name, message in told.items():
+        assert packets.read_told(version_before.packets(name)) == message
+    assert packets.VERSION == 1, "another one needs an answer to those that claim with 1"
 
 
 @given(FRAMES)

@@ -21,7 +21,8 @@ from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.journal import Since
 from nondum.host.catalogue.opening import Instead, Loss, Opened
 from nondum.host.catalogue.reserve import Reserve
-from nondum.host.core.records import JournalEntry, Snapshot
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.shielded import until_done
 from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem

@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.catalogue import journal, rows
-from nondum.host.core.records import ComponentRecord, JournalEntry, Rollback
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.payload import Rollback
 from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 

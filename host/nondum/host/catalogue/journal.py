@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from nondum.host.catalogue import rows
-from nondum.host.core.records import JournalEntry, Moment
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.moment import Moment
 
 KEEP = 20_000
 """Entries that are kept, the last ones, unless the caller sets a number: some eight megabytes."""

@@ -8,27 +8,24 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.plain import plain
-from nondum.host.core.records import (
-    ComponentRecord,
-    ComponentState,
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.device import (
     DeviceClaim,
     DeviceInterface,
     DeviceNode,
     DeviceRecord,
-    DriveRecord,
-    DriveState,
-    FormerPayload,
-    GoalRecord,
-    JournalEntry,
     KnownDevice,
-    Moment,
-    MountPose,
-    PayloadRecord,
-    Step,
 )
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.payload import FormerPayload, PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import Highwater
 from nondum.planning.merge.given_names import GivenNames
+from nondum.sdk.codec.values import to_plain
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
 
@@ -43,7 +40,7 @@ _DEVICE = (
 
 def as_json(value: Any) -> str:
     """Any value of a record as JSON text."""
-    return json.dumps(plain(value), ensure_ascii=False, separators=(",", ":"))
+    return json.dumps(to_plain(value), ensure_ascii=False, separators=(",", ":"))
 
 
 def storable(row: Row) -> Row:
@@ -220,7 +217,7 @@ def device_row(device: DeviceRecord) -> Row:
 def interface_rows(device: DeviceRecord) -> list[Row]:
     """Rows of `device_interfaces`."""
     return [
-        {"device": device.id, "position": i, **plain(interface)}
+        {"device": device.id, "position": i, **to_plain(interface)}
         for i, interface in enumerate(device.interfaces)
     ]
 

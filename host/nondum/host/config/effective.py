@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.config import host_config
+from nondum.host.config import host_config, parsing
 from nondum.host.config.host_config import HostConfig
 from nondum.host.config.places import Places
 from nondum.sdk.errors import Problem
@@ -57,9 +57,9 @@ def effective(asked: Asked) -> HostConfig:
     """The configuration that a daemon starts with. Raises `ConfigRefused`, with all that is wrong
     in the file, or with the name of the command line."""
     file = file_of(asked)
-    chosen = _defaults(asked) if file is None else host_config.load(file, _defaults(asked))
+    chosen = _defaults(asked) if file is None else parsing.load(file, _defaults(asked))
     if asked.name is not None:
-        host_config.check_name(asked.name, where="--name")
+        parsing.check_name(asked.name, where="--name")
         chosen = dataclasses.replace(chosen, host=dataclasses.replace(chosen.host, name=asked.name))
     if asked.peers:
         static = (*chosen.peers.static, *asked.peers)
@@ -71,7 +71,7 @@ def effective(asked: Asked) -> HostConfig:
 def settings(asked: Asked) -> Iterator[Setting]:
     """Every key, in the order of the reference. Raises `ConfigRefused` like `effective`."""
     chosen, file = effective(asked), file_of(asked)
-    places = Places(str(file), host_config.read(file)) if file else None
+    places = Places(str(file), parsing.read(file)) if file else None
     said = dict(_said(asked))
     for section, key, _ in host_config.documented():
         value = getattr(getattr(chosen, section), key)
@@ -86,8 +86,8 @@ def remarks(asked: Asked) -> Iterator[Problem]:
     chosen, file = effective(asked), file_of(asked)
     if file is None or chosen.peers.enabled:
         return
-    places = Places(str(file), host_config.read(file))
-    for key in host_config.REACHED_BY:
+    places = Places(str(file), parsing.read(file))
+    for key in parsing.REACHED_BY:
         if places.has("peers", key):
             told = f"[peers] {key} has no effect, for peers are off"
             where, fix = places.of("peers", key), "set `enabled = true` under [peers]"

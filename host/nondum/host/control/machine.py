@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nondum.sdk.codec.values import to_plain
+
 MEGABYTE = 1 << 20
 LOW_PERCENT = 20
 """A battery with no more than that is low."""
@@ -103,29 +105,7 @@ class Machine:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for people's tools."""
-        return {
-            "batteries": [
-                {"name": b.name, "percent": b.percent, "state": b.state} for b in self.batteries
-            ],
-            "disk": self.disk
-            and {
-                "path": self.disk.path,
-                "free_mb": self.disk.free_mb,
-                "size_mb": self.disk.size_mb,
-                "reserve_mb": self.disk.reserve_mb,
-            },
-            "temperatures": [
-                {"name": t.name, "celsius": t.celsius, "limit": t.limit} for t in self.temperatures
-            ],
-            "load": self.load
-            and {
-                "one_min": self.load.one_min,
-                "five_min": self.load.five_min,
-                "fifteen_min": self.load.fifteen_min,
-                "processors": self.load.processors,
-            },
-            "warnings": list(self.warnings()),
-        }
+        return {**to_plain(self), "warnings": list(self.warnings())}
 
 
 def look(

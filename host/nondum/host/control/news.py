@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nondum.host.core.events import DriveQueued, Event, ProgressMade
+from nondum.host.core.events.drives import DriveQueued
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import ProgressMade
 
 PROGRESS_S = 0.1
 """Progress within one phase is told no more often: a view costs more than a step of copying."""

@@ -6,17 +6,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from nondum.host.control.news import Progress
 from nondum.host.core.plain import Row
-from nondum.host.core.records import (
-    ComponentRecord,
-    ComponentState,
-    DriveRecord,
-    JournalEntry,
-    PayloadRecord,
-    PeerComponent,
-    Safety,
-    Snapshot,
-    Step,
-)
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.drive import DriveRecord
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.peer import PeerComponent
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.core.status import is_at_rest, waits_for_devices
 from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.host.workers.optional_inputs import Choice, Source

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
-from nondum.host.core.events import Emit, Event
+from nondum.host.core.events.event import Emit, Event
 from nondum.host.manager.payload_trust import PayloadTrust
 from nondum.wheelhouse.trust import trust_file
 from nondum.wheelhouse.trust.succession import SignedFile

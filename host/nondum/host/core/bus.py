@@ -7,8 +7,8 @@ import logging
 from collections.abc import Callable, Container, Sequence
 
 from nondum.host.core.clock import now
-from nondum.host.core.events import Emit, Event
-from nondum.host.core.records import Moment
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.records.moment import Moment
 
 Stamped = tuple[Event, Moment]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from nondum.host.core.records import Moment
+from nondum.host.core.records.moment import Moment
 
 
 def now() -> Moment:

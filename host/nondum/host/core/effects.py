@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nondum.host.core.records import DeviceNode
+from nondum.host.core.records.device import DeviceNode
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-from nondum.host.core.events import Event, PayloadFound, RetryAsked, RollbackAsked
-from nondum.host.core.records import JournalEntry, Moment, PayloadRecord
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import PayloadFound, RetryAsked
+from nondum.host.core.events.releases import RollbackAsked
+from nondum.host.core.records.journal import JournalEntry
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import TRANSITIONS
 

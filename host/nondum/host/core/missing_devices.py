@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nondum.host.core.records import ComponentRecord, ComponentState
+from nondum.host.core.records.component import ComponentRecord, ComponentState
 
 
 def waits(component: ComponentRecord) -> str:

@@ -6,20 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from nondum.host.core import payload_key
-from nondum.host.core.records import (
-    ComponentRecord,
-    DeviceRecord,
-    DriveRecord,
-    FormerPayload,
-    GoalRecord,
-    KnownDevice,
-    MountPose,
-    PayloadRecord,
-    PeerRecord,
-    Rollback,
-    Safety,
-    Snapshot,
-)
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.device import DeviceRecord, KnownDevice
+from nondum.host.core.records.drive import DriveRecord
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.payload import FormerPayload, PayloadRecord, Rollback
+from nondum.host.core.records.peer import PeerRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.planning.merge.given_names import GivenNames
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from nondum.host.core import missing_devices
-from nondum.host.core.records import (
-    ComponentRecord,
-    DriveState,
-    PayloadRecord,
-    Snapshot,
-    Step,
-)
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.sdk.errors import Problem
 
 _AT_REST = frozenset({Step.GONE, Step.ACTIVE, Step.SUPERSEDED, Step.REFUSED, Step.QUARANTINED})

@@ -9,10 +9,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from nondum.host.core import effects, events
+from nondum.host.core import effects
 from nondum.host.core.effects import PayloadEffect
-from nondum.host.core.events import Event
-from nondum.host.core.records import ComponentState, Step
+from nondum.host.core.events.drives import DriveReleased
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
+    ComponentsProbed,
+    PayloadActivated,
+    PayloadCleared,
+    PayloadCopied,
+    PayloadFailed,
+    PayloadFound,
+    PayloadRefused,
+    PayloadStaged,
+    PayloadVerified,
+    PayloadWithdrawn,
+    RetryAsked,
+    WheelsStored,
+)
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.releases import PayloadResumed, PayloadSuperseded, RollbackAsked
+from nondum.host.core.events.trust import PayloadDistrusted
+from nondum.host.core.events.workers import WorkerExited, WorkerFailed, WorkerReady
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.step import Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,52 +57,52 @@ _PRESENT = (
 )
 
 TRANSITIONS: _Rows = {
-    (Step.GONE, events.PayloadFound): Transition(Step.RECEIVED, effects.CopyPayload),
-    (Step.RECEIVED, events.PayloadCopied): Transition(Step.COPIED, effects.VerifyPayload),
-    (Step.COPIED, events.PayloadVerified): Transition(Step.VERIFIED, effects.StagePayload),
-    (Step.VERIFIED, events.PayloadStaged): Transition(Step.STAGED, effects.StoreWheels),
-    (Step.STAGED, events.WheelsStored): Transition(Step.STORED, effects.ProbeComponents),
-    (Step.STORED, events.ComponentsProbed): Transition(Step.PROBED, effects.ActivatePayload),
-    (Step.PROBED, events.PayloadActivated): Transition(Step.ACTIVE, effects.CompileWheels),
+    (Step.GONE, PayloadFound): Transition(Step.RECEIVED, effects.CopyPayload),
+    (Step.RECEIVED, PayloadCopied): Transition(Step.COPIED, effects.VerifyPayload),
+    (Step.COPIED, PayloadVerified): Transition(Step.VERIFIED, effects.StagePayload),
+    (Step.VERIFIED, PayloadStaged): Transition(Step.STAGED, effects.StoreWheels),
+    (Step.STAGED, WheelsStored): Transition(Step.STORED, effects.ProbeComponents),
+    (Step.STORED, ComponentsProbed): Transition(Step.PROBED, effects.ActivatePayload),
+    (Step.PROBED, PayloadActivated): Transition(Step.ACTIVE, effects.CompileWheels),
     **{
-        (step, events.PayloadRefused): Transition(Step.REFUSED, effects.ClearPayload)
+        (step, PayloadRefused): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _INSTALLING
     },
     **{
-        (step, events.PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
+        (step, PayloadFailed): Transition(Step.QUARANTINED, effects.SuspendPayload)
         for step in (Step.STORED, Step.PROBED, Step.ACTIVE)
     },
-    (Step.STORED, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
-    (Step.ACTIVE, events.PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
-    (Step.SUPERSEDED, events.PayloadResumed): Transition(Step.STORED, effects.ProbeComponents),
+    (Step.STORED, PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.ACTIVE, PayloadSuperseded): Transition(Step.SUPERSEDED, effects.RestPayload),
+    (Step.SUPERSEDED, PayloadResumed): Transition(Step.STORED, effects.ProbeComponents),
     **{
-        (step, events.PayloadSentAway): Transition(Step.REFUSED, effects.ClearPayload)
+        (step, PayloadSentAway): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _PRESENT
         if step is not Step.REFUSED
     },
     **{
-        (step, events.PayloadDistrusted): Transition(Step.REFUSED, effects.ClearPayload)
+        (step, PayloadDistrusted): Transition(Step.REFUSED, effects.ClearPayload)
         for step in _PRESENT
         if step is not Step.REFUSED
     },
-    (Step.REFUSED, events.RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
-    (Step.REFUSED, events.RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
-    (Step.QUARANTINED, events.RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
+    (Step.REFUSED, RetryAsked): Transition(Step.REMOVING, effects.ClearPayload),
+    (Step.REFUSED, RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
+    (Step.QUARANTINED, RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
     **{
-        (step, events.PayloadWithdrawn): Transition(Step.REMOVING, effects.ClearPayload)
+        (step, PayloadWithdrawn): Transition(Step.REMOVING, effects.ClearPayload)
         for step in _PRESENT
     },
-    (Step.REMOVING, events.PayloadCleared): Transition(Step.GONE),
+    (Step.REMOVING, PayloadCleared): Transition(Step.GONE),
 }
 """(step, event) → transition. What is not here is ignored: it comes from an earlier life."""
 
 HELD: frozenset[type[Event]] = frozenset(
     {
-        events.PayloadCopied,
-        events.PayloadVerified,
-        events.PayloadStaged,
-        events.ComponentsProbed,
-        events.DriveReleased,
+        PayloadCopied,
+        PayloadVerified,
+        PayloadStaged,
+        ComponentsProbed,
+        DriveReleased,
     }
 )
 """Progress that is not committed by itself: recovery does the same before it and after it. The next
@@ -104,11 +124,11 @@ RECOVERY: Mapping[Step, Transition] = {
 """Where a payload goes that a starting daemon finds at a step: back before STORED, else forward."""
 
 COMPONENT_TRANSITIONS: Mapping[tuple[ComponentState, type[Event]], ComponentState] = {
-    (ComponentState.READY, events.WorkerExited): ComponentState.RESTARTING,
-    (ComponentState.RESTARTING, events.WorkerReady): ComponentState.READY,
-    (ComponentState.READY, events.WorkerFailed): ComponentState.QUARANTINED,
-    (ComponentState.RESTARTING, events.WorkerFailed): ComponentState.QUARANTINED,
-    (ComponentState.QUARANTINED, events.RetryAsked): ComponentState.RESTARTING,
+    (ComponentState.READY, WorkerExited): ComponentState.RESTARTING,
+    (ComponentState.RESTARTING, WorkerReady): ComponentState.READY,
+    (ComponentState.READY, WorkerFailed): ComponentState.QUARANTINED,
+    (ComponentState.RESTARTING, WorkerFailed): ComponentState.QUARANTINED,
+    (ComponentState.QUARANTINED, RetryAsked): ComponentState.RESTARTING,
 }
 """The same for the components of an active payload."""
 

@@ -14,9 +14,9 @@ from typing import Protocol
 import pluggy
 
 from nondum.host.config.host_config import HostConfig
-from nondum.host.core.events import Emit
+from nondum.host.core.events.event import Emit
 from nondum.host.core.feedback_state import StateReason
-from nondum.host.core.records import Snapshot
+from nondum.host.core.records.snapshot import Snapshot
 
 PROJECT = "nondum.host"
 """The name of pluggy's project, and of the group of entry points."""
@@ -76,5 +76,5 @@ def feedback_outputs(host: Host) -> Iterable[Output]:  # type: ignore[empty-body
 
 @hookspec
 def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a specification
-    """Functions that are told every event, on the loop: one that changes the catalogue after that was
-    committed, or, for progress within a plug, held for the next commit."""
+    """Functions that are told every event, on the loop: one that changes the catalogue once that is
+    committed or, for progress within a plug, held for the next commit."""

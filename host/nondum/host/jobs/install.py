@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.plain import plain
 from nondum.host.jobs import look
+from nondum.host.jobs.installed_component import InstalledComponent
 from nondum.host.jobs.look import Arguments, Report
 from nondum.host.trust import chain
+from nondum.sdk.codec.values import to_plain
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.build import source
 from nondum.wheelhouse.format.lock import LockedWheel
@@ -69,7 +69,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         "uncompiled": uncompiled,
         "components": components,
         "needs": needs,
-        "gpu": asdict(gpu) if gpu is not None else None,
+        "gpu": to_plain(gpu),
         "grant": grant.to_dict(),
         "goals": list(staged.goals),
     }
@@ -189,27 +189,21 @@ def _checked(store: Store, locked: LockedWheel, alive: Callable[[], None]) -> St
     )
 
 
-def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> dict[str, Any]:
-    """A component as `Prepared.parse` reads it."""
+def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> Any:
     venv = root / component.id
     site_packages = venvs.site_packages(venv)
-    described = staged.index[component.id]
-    return {
-        "id": component.id,
-        "distribution": component.distribution,
-        "entry_point": source.installed_entry_point(
-            component.distribution, component.id, site_packages
-        ),
-        "description": described.to_dict(),
-        "venv": str(venv),
-        "site_packages": str(site_packages),
-        "permissions": list(component.permissions),
-        "settings": plain(component.settings),
-        "devices": [plain(need) for need in component.devices],
-        "mounts": list(_mounts(component)),
-    }
-
-
-def _mounts(component: ComponentManifest) -> Iterator[dict[str, Any]]:
-    for unit in component.units:
-        yield {"unit": unit.name, "xyz": list(unit.xyz), "rpy": list(unit.rpy)}
+    entry_point = source.installed_entry_point(component.distribution, component.id, site_packages)
+    return to_plain(
+        InstalledComponent(
+            component.id,
+            component.distribution,
+            entry_point,
+            staged.index[component.id],
+            venv,
+            site_packages,
+            component.permissions,
+            component.settings,
+            component.devices,
+            component.units,
+        )
+    )

@@ -199,13 +199,16 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
     problems: tuple[Problem, ...] = ()
     verdict = Verdict(())
     try:
-        data = drive.read_contents(folder)
+        data, where = drive.read_contents(folder), f"{folder.name}/{contents.NAME}"
         digest = hashlib.sha256(data).hexdigest()
-        verdict = verifier.verify(data, drive.read_signature(folder))
+        signature = drive.read_signature(folder)
+        verdict = verifier.verify(data, signature)
         problems = verdict.problems
         if not problems:
-            listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+            listed = contents.parse(data, where)
             problems = tuple(_version_problems(listed))
+        elif signature is None and (flaw := contents.begins_wrong(data, where)) is not None:
+            problems = (*problems, flaw)  # to sign it would not help
     except PayloadRefused as error:
         problems = error.problems
     except (NondumError, OSError, MemoryError):

@@ -7,52 +7,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.records import ComponentRecord, ComponentState, DeviceClaim, MountPose
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.device import DeviceClaim
+from nondum.host.core.records.mount import MountPose
+from nondum.host.jobs.installed_component import InstalledComponent
 from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
 from nondum.planning.merge.contribution import object_name
-from nondum.sdk.description import PluginDescription
+from nondum.sdk.codec.values import from_plain
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """One component, installed and not yet active."""
+class Prepared(InstalledComponent):
+    """One component, installed and not yet active; its id is its name on this host."""
 
-    id: str
-    """Its name on this host."""
-    distribution: str
-    entry_point: str
-    description: PluginDescription
-    venv: Path
-    site_packages: Path
     scratch: Path
-    permissions: tuple[str, ...]
-    settings: Mapping[str, Any]
-    claims: tuple[DeviceClaim, ...]
-    mounts: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
-    """(unit, xyz, rpy) as the manifest has them."""
 
     @classmethod
     def parse(cls, said: Mapping[str, Any], name: str, scratch: Path) -> Prepared:
-        """Read what the job `install` told. It comes from our own child and is trusted."""
-        return cls(
-            id=name,
-            distribution=said["distribution"],
-            entry_point=said["entry_point"],
-            description=PluginDescription.parse(said["description"], where=said["id"]),
-            venv=Path(said["venv"]),
-            site_packages=Path(said["site_packages"]),
-            scratch=scratch,
-            permissions=tuple(said["permissions"]),
-            settings=said["settings"],
-            claims=tuple(
-                DeviceClaim(need["name"], need["match"], need["optional"])
-                for need in said["devices"]
-            ),
-            mounts=tuple(
-                (mount["unit"], tuple(mount["xyz"]), tuple(mount["rpy"]))
-                for mount in said["mounts"]
-            ),
-        )
+        """Read an `InstalledComponent`. It comes from our own child and is trusted."""
+        return from_plain(cls, {**said, "id": name, "scratch": str(scratch)}, said["id"])
 
     def spec(self, payload: str, limits: Limits) -> WorkerSpec:
         """What its worker is started from."""
@@ -87,17 +60,12 @@ class Prepared:
             rank=0,
             permissions=self.permissions,
             settings=self.settings,
-            devices=self.claims,
+            devices=tuple(DeviceClaim(n.name, n.match, n.optional) for n in self.devices),
         )
 
     def poses(self, host: str) -> tuple[MountPose, ...]:
         """Where its units sit, as the payload says."""
         return tuple(
-            MountPose(object_name(host, self.id, unit), _xyz(xyz), _xyz(rpy), "payload")
-            for unit, xyz, rpy in self.mounts
+            MountPose(object_name(host, self.id, unit.name), unit.xyz, unit.rpy, "payload")
+            for unit in self.units
         )
-
-
-def _xyz(numbers: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = numbers
-    return x, y, z

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 
-from nondum.host.core.events import PayloadActivated, PayloadFound
-from nondum.host.core.records import Moment, PayloadRecord
+from nondum.host.core.events.payloads import PayloadActivated, PayloadFound
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.state import Highwater, HostState
 from nondum.host.lifecycle import releases
 from nondum.sdk.errors import Problem

@@ -9,9 +9,40 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
-from nondum.host.core.records import Moment
+from nondum.host.core.events.catalogue import Recomposed
+from nondum.host.core.events.daemon import HostStable, SafeModeLeft, TrialDue
+from nondum.host.core.events.devices import DeviceAppeared, DeviceChanged, DeviceRemoved
+from nondum.host.core.events.drives import (
+    DriveInserted,
+    DriveRead,
+    DriveRemoved,
+    DriveRetried,
+    DrivesScanned,
+    DriveUnreadable,
+)
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.goals import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.events.inputs import InputConnected
+from nondum.host.core.events.mounts import MountSet
+from nondum.host.core.events.payloads import (
+    ForgetAsked,
+    PayloadActivated,
+    PayloadFound,
+    PayloadVerified,
+    RetryAsked,
+    WheelsStored,
+)
+from nondum.host.core.events.peers import PeerJoined, PeerLeft, PeerShared
+from nondum.host.core.events.releases import BesideRefused, RollbackAsked, TrialFailed
+from nondum.host.core.events.trust import PayloadDoubted, TrustChanged
+from nondum.host.core.events.workers import (
+    ConditionEnded,
+    WorkerExited,
+    WorkerFailed,
+    WorkerReady,
+    WorkerStable,
+)
+from nondum.host.core.records.moment import Moment
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import TRANSITIONS
 from nondum.host.lifecycle import (
@@ -33,42 +64,42 @@ _Rule = Callable[[Turn, Any], None]
 
 RULES: Mapping[type[Event], _Rule] = {
     **{event: payload_rules.on_payload_step for _, event in TRANSITIONS},
-    events.DriveInserted: drive_rules.on_drive_inserted,
-    events.DriveRemoved: drive_rules.on_drive_removed,
-    events.DriveRead: drive_rules.on_drive_read,
-    events.DriveUnreadable: drive_rules.on_drive_unreadable,
-    events.DrivesScanned: drive_rules.on_drives_scanned,
-    events.PayloadFound: payload_rules.on_payload_found,
-    events.PayloadVerified: payload_rules.on_payload_verified,
-    events.WheelsStored: payload_rules.on_wheels_stored,
-    events.PayloadActivated: payload_rules.on_payload_activated,
-    events.BesideRefused: releases.on_beside_refused,
-    events.PayloadDoubted: payload_rules.on_payload_doubted,
-    events.TrustChanged: payload_rules.on_trust_changed,
-    events.RollbackAsked: payload_rules.on_rollback_asked,
-    events.RetryAsked: component_rules.on_retry_asked,
-    events.ForgetAsked: payload_rules.on_forget_asked,
-    events.TrialFailed: component_rules.on_trial_failed,
-    events.WorkerReady: component_rules.on_worker_news,
-    events.WorkerExited: component_rules.on_worker_news,
-    events.WorkerFailed: component_rules.on_worker_news,
-    events.WorkerStable: component_rules.on_worker_stable,
-    events.ConditionEnded: component_rules.on_condition_ended,
-    events.DeviceAppeared: component_rules.on_device_appeared,
-    events.DeviceChanged: component_rules.on_device_changed,
-    events.DeviceRemoved: component_rules.on_device_removed,
-    events.MountSet: component_rules.on_mount_set,
-    events.InputConnected: component_rules.on_input_connected,
-    events.GoalGiven: goal_rules.on_goal_given,
-    events.GoalReached: goal_rules.on_goal_over,
-    events.GoalEnded: goal_rules.on_goal_over,
-    events.HostStable: crash_attribution.on_host_stable,
-    events.TrialDue: retry_rules.on_trial_due,
-    events.DriveRetried: retry_rules.on_drive_retried,
-    events.SafeModeLeft: safe_mode_rules.on_left,
-    events.PeerJoined: peer_rules.on_peer_joined,
-    events.PeerShared: peer_rules.on_peer_shared,
-    events.PeerLeft: peer_rules.on_peer_left,
+    DriveInserted: drive_rules.on_drive_inserted,
+    DriveRemoved: drive_rules.on_drive_removed,
+    DriveRead: drive_rules.on_drive_read,
+    DriveUnreadable: drive_rules.on_drive_unreadable,
+    DrivesScanned: drive_rules.on_drives_scanned,
+    PayloadFound: payload_rules.on_payload_found,
+    PayloadVerified: payload_rules.on_payload_verified,
+    WheelsStored: payload_rules.on_wheels_stored,
+    PayloadActivated: payload_rules.on_payload_activated,
+    BesideRefused: releases.on_beside_refused,
+    PayloadDoubted: payload_rules.on_payload_doubted,
+    TrustChanged: payload_rules.on_trust_changed,
+    RollbackAsked: payload_rules.on_rollback_asked,
+    RetryAsked: component_rules.on_retry_asked,
+    ForgetAsked: payload_rules.on_forget_asked,
+    TrialFailed: component_rules.on_trial_failed,
+    WorkerReady: component_rules.on_worker_news,
+    WorkerExited: component_rules.on_worker_news,
+    WorkerFailed: component_rules.on_worker_news,
+    WorkerStable: component_rules.on_worker_stable,
+    ConditionEnded: component_rules.on_condition_ended,
+    DeviceAppeared: component_rules.on_device_appeared,
+    DeviceChanged: component_rules.on_device_changed,
+    DeviceRemoved: component_rules.on_device_removed,
+    MountSet: component_rules.on_mount_set,
+    InputConnected: component_rules.on_input_connected,
+    GoalGiven: goal_rules.on_goal_given,
+    GoalReached: goal_rules.on_goal_over,
+    GoalEnded: goal_rules.on_goal_over,
+    HostStable: crash_attribution.on_host_stable,
+    TrialDue: retry_rules.on_trial_due,
+    DriveRetried: retry_rules.on_drive_retried,
+    SafeModeLeft: safe_mode_rules.on_left,
+    PeerJoined: peer_rules.on_peer_joined,
+    PeerShared: peer_rules.on_peer_shared,
+    PeerLeft: peer_rules.on_peer_left,
 }
 """Event → rule. Other events change nothing here; the journal keeps those that ask for it."""
 
@@ -110,5 +141,5 @@ def settle(turn: Turn, before: HostState) -> Outcome:
     is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
     if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):
         turn.change(revision=before.revision + 1)
-        turn.events.append(events.Recomposed(turn.state.revision, turn.events[0].name))
+        turn.events.append(Recomposed(turn.state.revision, turn.events[0].name))
     return turn.outcome()

@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from nondum.host.core.records import ComponentRecord, PayloadRecord, Step
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.planning.merge import given_names
 from nondum.planning.merge.given_names import NO_NAMES, GivenNames, Words, words_of

@@ -5,22 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nondum.host.core.effects import RestartWorker
-from nondum.host.core.events import (
+from nondum.host.core.events.devices import DeviceAppeared, DeviceChanged, DeviceRemoved
+from nondum.host.core.events.inputs import InputConnected
+from nondum.host.core.events.mounts import MountSet
+from nondum.host.core.events.payloads import PayloadFailed, RetryAsked
+from nondum.host.core.events.releases import TrialFailed
+from nondum.host.core.events.workers import (
     ConditionEnded,
-    DeviceAppeared,
-    DeviceChanged,
-    DeviceRemoved,
-    InputConnected,
-    MountSet,
-    PayloadFailed,
-    RetryAsked,
-    TrialFailed,
     WorkerExited,
     WorkerFailed,
     WorkerReady,
     WorkerStable,
 )
-from nondum.host.core.records import ComponentRecord, ComponentState, DeviceRecord, MountPose, Step
+from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.device import DeviceRecord
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.step import Step
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS
 from nondum.host.lifecycle import known_devices, releases
 from nondum.host.lifecycle.payload_rules import on_payload_tried

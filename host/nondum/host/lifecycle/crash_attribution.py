@@ -8,25 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Set
 
-from nondum.host.core.events import (
-    DriveRead,
-    DriveRemoved,
-    DriveRetried,
-    DriveUnreadable,
-    Event,
-    HostStable,
-    PayloadFound,
-    RetryAsked,
-)
-from nondum.host.core.records import (
-    INSTALLED,
-    DriveRecord,
-    DriveState,
-    PayloadRecord,
-    Safety,
-    Snapshot,
-    Step,
-)
+from nondum.host.core.events.daemon import HostStable
+from nondum.host.core.events.drives import DriveRead, DriveRemoved, DriveRetried, DriveUnreadable
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import PayloadFound, RetryAsked
+from nondum.host.core.records.drive import INSTALLED, DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import Problem

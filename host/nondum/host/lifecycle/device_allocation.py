@@ -1,7 +1,7 @@
 """Which device serves which declared need of which component.
 
 The rule: a need is given all nodes of a device that match it, or none. A device stays with the
-component that has it; a free one goes to the first component, by name, that needs it, and of several
+component that has it; a free one goes to the first that needs it, by name, and of several
 that serve a need the first by port is given. Several components may have parts of one device, as
 long as no node is wanted twice. The host tells people which other components want a device. It does
 not touch a device that no component needs.
@@ -14,8 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from nondum.host.core.effects import AttachDevice, DetachDevice, RestartWorker
-from nondum.host.core.events import DeviceClaimed, DeviceReleased, RetryAsked
-from nondum.host.core.records import ComponentRecord, DeviceClaim, DeviceNode, DeviceRecord
+from nondum.host.core.events.devices import DeviceClaimed, DeviceReleased
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.device import DeviceClaim, DeviceNode, DeviceRecord
 from nondum.host.core.transitions import COMPONENT_TRANSITIONS
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.sources.devices.matching import chosen, serving

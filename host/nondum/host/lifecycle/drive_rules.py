@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nondum.host.core.effects import CopyPayload, ReadDrive, ReleaseDrive
-from nondum.host.core.events import (
+from nondum.host.core.events.drives import (
     DriveInserted,
     DriveRead,
     DriveRemoved,
     DrivesScanned,
     DriveUnreadable,
-    PayloadFound,
-    PayloadWithdrawn,
 )
-from nondum.host.core.records import DriveRecord, DriveState, PayloadRecord, Step
+from nondum.host.core.events.payloads import PayloadFound, PayloadWithdrawn
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution, releases, safe_mode
 from nondum.host.lifecycle.turn import Turn

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from nondum.host.catalogue.rows import as_json
-from nondum.host.core.records import ComponentRecord, FormerPayload, PayloadRecord, PeerComponent
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.payload import FormerPayload, PayloadRecord
+from nondum.host.core.records.peer import PeerComponent
 from nondum.sdk.description import PluginDescription
 
 PAYLOADS_LIMIT = 200

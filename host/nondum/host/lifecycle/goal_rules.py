@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import cast
 
-from nondum.host.core.events import GoalEnded, GoalGiven, GoalReached
-from nondum.host.core.records import GoalRecord
+from nondum.host.core.events.goals import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.records.goal import GoalRecord
 from nondum.host.lifecycle.turn import Turn
 from nondum.planning.merge.goal import GoalKind
 

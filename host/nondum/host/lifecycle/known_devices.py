@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nondum.host.core.records import DeviceRecord, KnownDevice
+from nondum.host.core.records.device import DeviceRecord, KnownDevice
 
 MOST = 200
 """Devices that are remembered, at most; beyond them the least recently seen are forgotten."""

@@ -18,26 +18,25 @@ from nondum.host.core.effects import (
     StoreWheels,
     SuspendPayload,
 )
-from nondum.host.core.events import (
-    Event,
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.payloads import (
     ForgetAsked,
     PayloadActivated,
-    PayloadDistrusted,
-    PayloadDoubted,
     PayloadFailed,
     PayloadFound,
     PayloadRefused,
-    PayloadResumed,
-    PayloadSentAway,
-    PayloadSuperseded,
     PayloadVerified,
     PayloadWithdrawn,
     RetryAsked,
-    RollbackAsked,
-    TrustChanged,
     WheelsStored,
 )
-from nondum.host.core.records import ComponentRecord, MountPose, PayloadRecord, Step
+from nondum.host.core.events.placement import PayloadSentAway
+from nondum.host.core.events.releases import PayloadResumed, PayloadSuperseded, RollbackAsked
+from nondum.host.core.events.trust import PayloadDistrusted, PayloadDoubted, TrustChanged
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import TRANSITIONS, Transition
 from nondum.host.lifecycle import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from nondum.host.core.events import PeerJoined, PeerLeft, PeerShared
-from nondum.host.core.records import PeerRecord
+from nondum.host.core.events.peers import PeerJoined, PeerLeft, PeerShared
+from nondum.host.core.records.peer import PeerRecord
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.turn import Turn
 

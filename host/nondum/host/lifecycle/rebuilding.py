@@ -15,7 +15,10 @@ from typing import Any
 
 from nondum.host.core import payload_key
 from nondum.host.core.effects import NoteInstalled
-from nondum.host.core.records import INSTALLED, DriveRecord, DriveState, Moment, PayloadRecord, Step
+from nondum.host.core.records.drive import INSTALLED, DriveRecord, DriveState
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import Highwater, HostState
 from nondum.host.core.transitions import KEEPS_FOLDER
 from nondum.host.jobs.look import Arguments, Report

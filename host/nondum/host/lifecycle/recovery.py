@@ -9,8 +9,12 @@ from collections.abc import Set
 from dataclasses import replace
 
 from nondum.host.core.effects import SuspendPayload
-from nondum.host.core.events import HostStarted, Recovered, SafeModeEntered
-from nondum.host.core.records import Moment, PayloadRecord, Safety, Step
+from nondum.host.core.events.daemon import HostStarted, SafeModeEntered
+from nondum.host.core.events.payloads import Recovered
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import KEEPS_FOLDER, RECOVERY, Transition
 from nondum.host.lifecycle import crash_attribution, releases, safe_mode

@@ -11,16 +11,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from nondum.host.core.effects import ProbeComponents
-from nondum.host.core.events import (
+from nondum.host.core.events.payloads import PayloadFailed, PayloadFound, RetryAsked
+from nondum.host.core.events.releases import (
     BesideRefused,
-    PayloadFailed,
-    PayloadFound,
     PayloadResumed,
     PayloadSuperseded,
-    RetryAsked,
     RollbackAsked,
 )
-from nondum.host.core.records import ComponentRecord, DeviceRecord, PayloadRecord, Rollback, Step
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.device import DeviceRecord
+from nondum.host.core.records.payload import PayloadRecord, Rollback
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.device_allocation import handed_over
 from nondum.host.lifecycle.turn import Turn

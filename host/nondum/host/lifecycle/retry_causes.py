@@ -10,7 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from nondum.host.core.records import DriveRecord, DriveState, PayloadRecord, Snapshot, Step
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.sdk.errors import Problem
 
 FIRST_S = 5.0

@@ -5,8 +5,11 @@ Not all that daemons seem to die of is to blame: power that fails for a moment c
 
 from __future__ import annotations
 
-from nondum.host.core.events import DriveRetried, RetryAsked, TrialDue
-from nondum.host.core.records import DriveState, Safety
+from nondum.host.core.events.daemon import TrialDue
+from nondum.host.core.events.drives import DriveRetried
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.safety import Safety
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution, drive_rules
 from nondum.host.lifecycle.retry_causes import is_unread

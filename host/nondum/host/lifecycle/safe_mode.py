@@ -10,7 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from nondum.host.core.records import INSTALLED, PayloadRecord, Safety, Step
+from nondum.host.core.records.drive import INSTALLED
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import crash_attribution
 from nondum.sdk.errors import Problem

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from nondum.host.core.effects import JudgePayloads
-from nondum.host.core.events import RetryAsked, SafeModeLeft
-from nondum.host.core.records import Safety
+from nondum.host.core.events.daemon import SafeModeLeft
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.safety import Safety
 from nondum.host.lifecycle import drive_rules, releases
 from nondum.host.lifecycle.safe_mode import CODE, waits
 from nondum.host.lifecycle.turn import Turn

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import Event
-from nondum.host.core.records import (
-    ComponentRecord,
-    DriveRecord,
-    Moment,
-    PayloadRecord,
-    PeerRecord,
-    Step,
-)
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.drive import DriveRecord
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.peer import PeerRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.former_payloads import remembering, remembering_peer
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from nondum.host.core.events import Emit, SafeModeLeft, TrialDue
-from nondum.host.core.records import Safety, Snapshot
+from nondum.host.core.events.daemon import SafeModeLeft, TrialDue
+from nondum.host.core.events.event import Emit
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.crash_loop import CrashCounter
 

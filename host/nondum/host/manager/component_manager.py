@@ -17,16 +17,18 @@ from nondum.host.catalogue import opening
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.bus import Bus, Stamped
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import (
+from nondum.host.core.events.catalogue import (
     CatalogueSetAside,
     CatalogueUnwritten,
     CatalogueWritten,
-    DrivesScanned,
-    HostStable,
-    HostStopped,
 )
+from nondum.host.core.events.daemon import HostStable, HostStopped
+from nondum.host.core.events.drives import DrivesScanned
 from nondum.host.core.journal_entry import entries_of
-from nondum.host.core.records import INSTALLED, Moment, Safety, Snapshot
+from nondum.host.core.records.drive import INSTALLED
+from nondum.host.core.records.moment import Moment
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import HELD
 from nondum.host.lifecycle.advance import advance

@@ -8,9 +8,10 @@ import contextlib
 import logging
 from pathlib import Path
 
-from nondum.host.core.events import Event, HostStarted
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.event import Event
 from nondum.host.core.keyed_queues import in_thread
-from nondum.host.core.records import Safety
+from nondum.host.core.records.safety import Safety
 from nondum.host.lifecycle import safe_mode
 from nondum.wheelhouse.store import disk
 

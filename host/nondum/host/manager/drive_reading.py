@@ -10,15 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.effects import ReadDrive, ReleaseDrive
-from nondum.host.core.events import (
-    CertificatesBrought,
-    DriveQueued,
-    DriveRead,
-    DriveReleased,
-    Emit,
-    Event,
-    PayloadFound,
-)
+from nondum.host.core.events.drives import DriveQueued, DriveRead, DriveReleased
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.payloads import PayloadFound
+from nondum.host.core.events.peers import CertificatesBrought
 from nondum.host.core.keyed_queues import in_thread
 from nondum.host.jobs.children import Children
 from nondum.host.jobs.queue import Queue

@@ -16,16 +16,11 @@ from typing import Any
 
 from nondum.host.core import effects
 from nondum.host.core.effects import Effect
-from nondum.host.core.events import (
-    DriveUnreadable,
-    Emit,
-    Event,
-    PayloadCleared,
-    PayloadFailed,
-    PayloadRefused,
-)
+from nondum.host.core.events.drives import DriveUnreadable
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.payloads import PayloadCleared, PayloadFailed, PayloadRefused
 from nondum.host.core.keyed_queues import KeyedQueues
-from nondum.host.core.records import Moment
+from nondum.host.core.records.moment import Moment
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import Children
 from nondum.host.jobs.idle_scheduling import IdleScheduler

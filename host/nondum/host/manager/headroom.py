@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nondum.sdk.codec.values import from_plain
 from nondum.wheelhouse.payload.memory import Memory
 
 RESERVE_MB = 64
@@ -28,7 +29,7 @@ class Needs:
     @classmethod
     def parse(cls, said: Mapping[str, Any]) -> Needs:
         """Read what the job `install` told. It comes from our own child and is trusted."""
-        return cls(**said)
+        return from_plain(cls, said)
 
 
 def why_not_beside(needs: Needs, used_mb: int, have: Memory) -> str:

@@ -13,8 +13,11 @@ from pathlib import Path
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.bus import Bus
-from nondum.host.core.events import DriveInserted, DriveRemoved, RetryAsked
-from nondum.host.core.records import INSTALLED, PayloadRecord, Step
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.drive import INSTALLED
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle import releases
 from nondum.host.manager.watch import Watch

@@ -16,11 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core import effects
-from nondum.host.core.events import (
-    BesideRefused,
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.payloads import (
     ComponentsProbed,
-    Emit,
-    Event,
     PayloadActivated,
     PayloadCleared,
     PayloadCopied,
@@ -30,8 +28,9 @@ from nondum.host.core.events import (
     WheelsCompiled,
     WheelsStored,
 )
+from nondum.host.core.events.releases import BesideRefused
 from nondum.host.core.keyed_queues import in_thread
-from nondum.host.core.records import Moment
+from nondum.host.core.records.moment import Moment
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import STALL_S, Children
 from nondum.host.jobs.queue import Queue

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.records import ComponentRecord, MountPose
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.mount import MountPose
 from nondum.host.jobs.prepared import Prepared
 from nondum.host.manager.headroom import Needs
 from nondum.host.workers.spec import Limits, WorkerSpec

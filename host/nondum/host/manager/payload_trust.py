@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.effects import JudgePayloads
-from nondum.host.core.events import (
-    Event,
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.trust import (
     PayloadDistrusted,
     PayloadDoubted,
     TrustChanged,

@@ -5,8 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection
 
-from nondum.host.core.events import DriveRetried, Emit, RetryAsked
-from nondum.host.core.records import Snapshot, Step
+from nondum.host.core.events.drives import DriveRetried
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.payloads import RetryAsked
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.lifecycle import retry_causes
 from nondum.host.lifecycle.retry_causes import Amounts, Unread, Waiting
 

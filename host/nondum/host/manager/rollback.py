@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.bus import Bus
-from nondum.host.core.events import RollbackAsked
-from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.events.releases import RollbackAsked
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.core.unknown import unknown
 from nondum.host.lifecycle import releases

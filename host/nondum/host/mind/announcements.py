@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from nondum.host.core import missing_devices
-from nondum.host.core.records import ComponentRecord, PeerComponent
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.peer import PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
 from nondum.sdk.errors import Problem

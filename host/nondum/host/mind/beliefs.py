@@ -6,15 +6,10 @@ import logging
 import re
 from collections.abc import Callable, Mapping
 
-from nondum.host.core.events import (
-    Event,
-    FactForgotten,
-    FactKnown,
-    StreamFlowing,
-    UnitsTaken,
-    WorkerExited,
-)
-from nondum.host.core.records import Snapshot
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing, UnitsTaken
+from nondum.host.core.events.workers import WorkerExited
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.composition import Composition, always_produced, body_facts, own_objects
 from nondum.planning.execute.world import WorldModel
 from nondum.planning.merge.core import HOST_PREDICATES

@@ -13,7 +13,9 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import pluggy
 
-from nondum.host.core.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.peer import PeerComponent
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.planning.merge.contribution import Contribution
 from nondum.sdk import hooks
 from nondum.sdk.description import (

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from nondum.host.core.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.peer import PeerComponent
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.component_plugins import ComponentPlugins
 from nondum.planning.merge.contribution import Contribution, object_name
 from nondum.planning.merge.domain import Merged

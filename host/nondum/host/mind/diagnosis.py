@@ -7,7 +7,8 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from nondum.host.core.records import FormerPayload, Snapshot
+from nondum.host.core.records.payload import FormerPayload
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.lack import Need
 from nondum.host.mind.missing_reports import Silence
 from nondum.planning.explain.explain import explain, suppliers

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from nondum.host.core.records import MountPose, Snapshot
+from nondum.host.core.records.mount import MountPose
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.sdk.geometry import FrameTree, Transform
 
 MAX_DISTANCE_M = 5.0

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from nondum.host.core.records import GoalRecord
+from nondum.host.core.records.goal import GoalRecord
 from nondum.host.mind.lack import Need
 from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem

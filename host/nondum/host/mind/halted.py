@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from nondum.host.core.events import BehavioursHalted
+from nondum.host.core.events.behaviours import BehavioursHalted
 from nondum.planning.execute.running import Run, RunState
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, cast
+
+from nondum.sdk.codec.values import to_plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,4 +25,4 @@ class Need:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {**asdict(self), "types": list(self.types)}
+        return cast(dict[str, Any], to_plain(self))

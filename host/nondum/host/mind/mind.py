@@ -15,9 +15,11 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from nondum.host.core.events import Emit, Event, GoalEnded, GoalGiven
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.goals import GoalEnded, GoalGiven
 from nondum.host.core.names import shortened
-from nondum.host.core.records import GoalRecord, Snapshot
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.announcements import People, kept_out, recomposed
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.component_leaf import ComponentLeaf
@@ -225,10 +227,10 @@ class Mind:
                 self.people.tell(f"goal {goal.id} is halted: {goal.text}")
         if now:
             running = tuple(run.step.name for run in self.runner)
-            self.pursuit.drop(why)
+            self.pursuit.pursued.drop(why)
             self.runner.halt_all()
         else:
-            running = self.pursuit.drop_ended(why)
+            running = self.pursuit.pursued.drop_ended(why)
         self.wake()
         return running
 
@@ -238,7 +240,7 @@ class Mind:
         """Tick the system tree once."""
         self.ticks += 1
         self.root.tick_once()
-        if (halts := self._halts.after(self.ticks, self.pursuit.runs)) is not None:
+        if (halts := self._halts.after(self.ticks, self.pursuit.pursued.runs)) is not None:
             self._emit(halts)
 
     async def run(self) -> None:
@@ -304,7 +306,7 @@ class Mind:
             monitor=Duty("monitor", self._monitor),
             world_model=Duty("world model", self._believe),
             goals=Duty("goals", self._choose),
-            task=TaskSlot(lambda: self.pursuit.trees, Hold(self._waits_for)),
+            task=TaskSlot(lambda: self.pursuit.pursued.trees, Hold(self._waits_for)),
             people=Duty("people", lambda: f"{self.people.last_number} sentences told"),
             behaviour=self._behaviour_leaf,
             facts=lambda: self.beliefs.world.facts,

@@ -7,16 +7,19 @@ What planning says of such a fact, that nothing here makes it true, holds of act
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias, cast
 
 from nondum.host.core import missing_devices
 from nondum.host.core.placed import place_of
-from nondum.host.core.records import ComponentRecord, PeerComponent, Snapshot
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.peer import PeerComponent
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.lack import Need
 from nondum.planning.explain.cause import Cause, Lack
 from nondum.planning.merge.contribution import object_name
 from nondum.planning.pddl.facts import parts
+from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import Problem
 
 
@@ -50,17 +53,11 @@ class Silence:
     @classmethod
     def parse(cls, told: Mapping[str, Any]) -> Silence:
         """Read what `to_dict` gave. It comes from our own daemon and is trusted."""
-        return cls(
-            _parsed(told["untold"]),
-            _parsed(told["unready"]),
-        )
+        return from_plain(cls, told)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "untold": {name: [*map(asdict, reasons)] for name, reasons in self.untold.items()},
-            "unready": {name: [*map(asdict, reasons)] for name, reasons in self.unready.items()},
-        }
+        return cast(dict[str, Any], to_plain(self))
 
     def problem(self, cause: Cause) -> Problem:
         """A cause as a problem, with the reason for the silence where there is one."""
@@ -91,10 +88,6 @@ class Silence:
 
 def _is_to_be_told(cause: Cause) -> bool:
     return cause.lack is Lack.ACTION
-
-
-def _parsed(told: Mapping[str, Any]) -> Reasons:
-    return {name: tuple(Reason(**reason) for reason in reasons) for name, reasons in told.items()}
 
 
 def _gathered(pairs: Iterator[tuple[str, Reason]]) -> Reasons:

@@ -7,34 +7,37 @@ as it can by itself; it is replaced between two ticks, and what runs and is stil
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
-from nondum.host.core.events import Emit, GoalEnded, GoalReached, PlanMade, PlanMissing
-from nondum.host.core.records import ComponentState
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.goals import GoalEnded, PlanMade, PlanMissing
+from nondum.host.core.records.component import ComponentState
 from nondum.host.mind import short_names
 from nondum.host.mind.announcements import People, kept_out
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
+from nondum.host.mind.conclusions import Conclusions
 from nondum.host.mind.diagnosis import Seen, seen_in
-from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced, urgency
+from nondum.host.mind.exclusions import Exclusions
+from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState, is_replaced
+from nondum.host.mind.kept_plans import kept, still_works
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.pursued import Pursued, conflicts
-from nondum.host.mind.search import search, task_of
+from nondum.host.mind.pursued_goals import PursuedGoals, each_once
+from nondum.host.mind.running_search import RunningSearch
+from nondum.host.mind.search import search
 from nondum.host.mind.search_order import Turns
-from nondum.host.mind.situation import NoPlan, OtherPlans, Outcome, Past, Planned, Situation, Waits
-from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
+from nondum.host.mind.situation import NoPlan, Past, Planned, Situation, Waits
+from nondum.host.mind.situations import Situations
+from nondum.planning.execute.attempts import Attempts, Patience
 from nondum.planning.execute.independence import Reservation
-from nondum.planning.execute.plan_executive import Phase, PlanExecutive
-from nondum.planning.execute.replay import beginning_at, replayed
+from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.execute.running import Run
 from nondum.planning.execute.running_leaves import RunningLeaves
 from nondum.planning.execute.task_tree import TaskTree
-from nondum.planning.ground.conditional_effects import plain
-from nondum.planning.merge.goal import parse_goal
-from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
+from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
 
 log = logging.getLogger(__name__)
@@ -59,7 +62,8 @@ class Pursuit:
     ) -> None:
         """`wake` asks for a tick: a search has ended."""
         self.queue = queue
-        self._pursued: dict[str, Pursued] = {}
+        self.pursued = PursuedGoals(queue)
+        """The goals that are pursued now."""
         self._beliefs = beliefs
         self._leaves = leaves
         self._planners = planners
@@ -68,32 +72,17 @@ class Pursuit:
         self._now_s = now_s
         self._deadline_s = deadline_s
         self._patience = patience
-        self._wake = wake
         self._composition: Composition | None = None
         self._seen: tuple[Seen, ...] = ()
         self._left_out: dict[str, Problem] = {}
-        self._failures: dict[str, str] = {}
-        self._search: asyncio.Task[Outcome] | None = None
-        self._searched_for: Situation | None = None
+        self._search = RunningSearch(wake)
         self._tried: dict[int, Situation] = {}
         """By the number of a goal: one that is given again under its id was not tried yet."""
         self._turns = Turns()
-        self._excluded_until_s: dict[str, float] = {}
-        self.setbacks = Setbacks()
-        self._left_over: tuple[Run, ...] = ()
-        self._facts: dict[frozenset[str], frozenset[str]] = {}
-        """Actions that go on → what holds then, at one revision of the world."""
-        self._facts_of = -1
-
-    @property
-    def pursued(self) -> tuple[Pursued, ...]:
-        """The goals that are pursued now, the most urgent first."""
-        return tuple(sorted(self._pursued.values(), key=lambda one: urgency(self.queue[one.goal])))
-
-    @property
-    def trees(self) -> tuple[TaskTree, ...]:
-        """The task trees to tick."""
-        return tuple(one.tree for one in self.pursued)
+        self.exclusions = Exclusions(now_s)
+        """The actions that are not planned with for now."""
+        self._situations = Situations(queue, beliefs, self.pursued, self.exclusions)
+        self._conclusions = Conclusions(queue, beliefs, people, emit, now_s)
 
     @property
     def seen(self) -> tuple[Seen, ...]:
@@ -106,23 +95,12 @@ class Pursuit:
         return tuple(sorted(self._left_out.items()))
 
     @property
-    def runs(self) -> tuple[Run, ...]:
-        """All that was started and has not been seen to end, of this plan and of those before."""
-        current = (run for one in self.pursued for run in one.tree.control.runs.values())
-        return _once((*current, *self._left_over))
-
-    @property
-    def failures(self) -> dict[str, str]:
-        """The actions that are excluded, and how they failed."""
-        return {name: self._failures.get(name, "") for name in sorted(self.excluded)}
-
-    @property
     def troubles(self) -> dict[str, str]:
         """Actions that fail and are tried again, or are left out for it, and how they failed."""
         controls = [one.tree.control for one in self.pursued]
         well = {name for control in controls for name in control.proven(self._now_s())}
         attempts = [control.attempts for control in controls]
-        attempts = attempts or [Attempts(self._patience, self.setbacks)]
+        attempts = attempts or [Attempts(self._patience, self.exclusions.setbacks)]
         return {
             name: why
             for one in attempts
@@ -133,31 +111,26 @@ class Pursuit:
     @property
     def is_searching(self) -> bool:
         """Whether a plan is being searched for."""
-        return self._search is not None
-
-    @property
-    def excluded(self) -> frozenset[str]:
-        """The actions that failed too often to be planned with for now."""
-        now_s = self._now_s()
-        return frozenset(n for n, until_s in self._excluded_until_s.items() if until_s > now_s)
+        return self._search.is_running
 
     # Between ticks
 
     def step(self) -> None:
         """Draw the conclusions of the last tick, and see to plans for what is wanted."""
-        self._left_over = tuple(r for r in self._left_over if not r.action.state.has_ended)
+        self.pursued.forget_ended()
         for one in self.pursued:
-            self._conclude(one)
+            if self._conclusions.draw(one):
+                self.pursued.drop("the goal is reached", one.goal)
         self._take_found()
         if self._composition is None:
             return
-        self.drop_ended("its goal is over")
+        self.pursued.drop_ended("its goal is over")
         while (goal := self._next()) is not None:
             if not self._is_searched_for(goal):
                 self._start_search(goal)
-            if self._search is not None:
+            if self._search.is_running:
                 return
-        self._cancel_search()
+        self._search.cancel()
 
     def adopt(self, composition: Composition) -> None:
         """Go on with the plan in a new composition if it still works there."""
@@ -165,117 +138,37 @@ class Pursuit:
         if not set(before) <= set(composition.contributions):  # what is left may be small enough
             self._note_left_out({})
         if self._composition is None or _parts(self._composition) != _parts(composition):
-            self._excluded_until_s.clear()  # what it failed for may be another now
-            self.setbacks.clear()
+            self.exclusions.clear()
         self._turns.restart()
         self._composition = composition
         self._seen = seen_in(composition.snapshot)
         for one in self.pursued:
-            kept = self._replayed(composition, one)
-            if kept is None:
+            situation, believed = self._situation(one.goal), self._beliefs.world.facts
+            plan = kept(composition, self.queue[one.goal], one, situation, believed)
+            if plan is None:
                 one.is_outdated = True
             else:
-                self._grow(one.goal, *kept, phase=one.phase)
-        for goal in conflicts(self.pursued):
-            self._pursued[goal].is_outdated = True
-
-    def drop(self, because: str, goal: str | None = None) -> tuple[str, ...]:
-        """Stop pursuing a goal, or all: everything that runs for it is halted. Gives its names."""
-        dropped = [one for one in self.pursued if goal in (None, one.goal)]
-        runs = [run for one in dropped for run in one.tree.control.runs.values()]
-        for one in dropped:
-            one.tree.halt(because)
-            self._left_over = _once((*self._left_over, *one.tree.release()))
-            del self._pursued[one.goal]
-        return tuple(run.step.name for run in _once(runs))
-
-    def drop_ended(self, because: str) -> tuple[str, ...]:
-        """Stop pursuing goals that are over. Gives the names of what is halted."""
-        over = [one.goal for one in self.pursued if self.queue[one.goal].state.is_final]
-        return tuple(name for goal in over for name in self.drop(because, goal))
+                self._grow(one.goal, *plan, phase=one.phase)
+        outdated = conflicts(self.pursued)
+        for one in self.pursued:
+            if one.goal in outdated:
+                one.is_outdated = True
 
     async def close(self) -> None:
         """Stop searching and pursuing."""
-        self.drop("the host is stopping")
-        if self._search is not None:
-            self._search.cancel()
-            await asyncio.gather(self._search, return_exceptions=True)
-
-    # What the last tick came to
-
-    def _conclude(self, one: Pursued) -> None:
-        control = one.tree.control
-        if not control.decisions:  # not ticked yet
-            return
-        phase = control.phase
-        if phase is not one.phase:
-            one.phase, one.trouble = phase, ""
-            self._tell_phase(one, phase)
-        for name in control.proven(self._now_s()):
-            control.attempts.effective(name)
-        if phase is Phase.UNDER_WAY and (trouble := control.trouble()) != one.trouble:
-            one.trouble = trouble
-            self.queue.put(one.goal, GoalState.ACTIVE, trouble)
-        if phase is Phase.REACHED:
-            goal = self.queue.put(one.goal, GoalState.REACHED, control.answer or "it holds")
-            if goal.kind == "do":  # the next time that it is asked for, it is done again
-                self._beliefs.world.withdraw_effects(control.regression.goal)
-            self._emit(GoalReached(one.goal))
-            self.drop("the goal is reached", one.goal)
-
-    def _tell_phase(self, one: Pursued, phase: Phase) -> None:
-        goal = self.queue[one.goal]
-        if phase is Phase.REACHED:
-            answer = one.tree.control.answer
-            told = f"{goal.text}: {answer}" if answer else f"goal {goal.id} is reached: {goal.text}"
-            self._people.tell(told)
-        elif phase is Phase.HOLDING:
-            self.queue.put(goal.id, GoalState.ACTIVE, "it holds and is kept so")
-            self._people.tell(f"goal {goal.id} holds and is kept so: {goal.text}")
-        elif phase is Phase.UNDER_WAY:
-            self.queue.put(goal.id, GoalState.ACTIVE, "")
-        elif why := one.tree.needs_replan:
-            self.queue.put(goal.id, GoalState.ACTIVE, f"another plan is needed: {why}")
-            self._people.tell(f"goal {goal.id} needs another plan: {why}")
+        self.pursued.drop("the host is stopping")
+        await self._search.close()
 
     # Searching
 
     def _situation(self, goal: str) -> Situation:
         revision = self._composition.revision if self._composition else 0
-        world = self._beliefs.world
-        return Situation(goal, revision, world.bare_facts, self.excluded, self._other_plans(goal))
-
-    def _other_plans(self, goal: str) -> OtherPlans:
-        others = [one for one in self.pursued if one.goal != goal]
-        if not others:
-            return OtherPlans()
-        mine = urgency(self.queue[goal])
-        firm = [one for one in others if urgency(self.queue[one.goal]) < mine]
-        yielding = others[len(firm) :]
-        return OtherPlans(
-            tuple(one.reservation for one in firm),
-            tuple(one.reservation for one in yielding),
-            self._facts_with(firm),
-            self._facts_with(others),
-        )
-
-    def _facts_with(self, others: Iterable[Pursued]) -> frozenset[str]:
-        """What holds while other goals are pursued, and nothing else runs."""
-        world = self._beliefs.world
-        if self._facts_of != world.revision:
-            self._facts_of = world.revision
-            self._facts.clear()
-        runs = (run for one in others for run in one.tree.control.runs.values())
-        going_on = frozenset(run.step.name for run in runs if not run.is_halting)
-        if going_on not in self._facts:
-            ended = {run.step.name for run in self.runs} - going_on
-            self._facts[going_on] = world.facts_without(ended)
-        return self._facts[going_on]
+        return self._situations.of(goal, revision)
 
     def _is_on_its_way(self, goal: GivenGoal) -> bool:
         """Whether a goal has a plan that goes on, or nothing new is known since none was found."""
-        if one := self._pursued.get(goal.id):
-            self._exclude(one.tree.control)
+        if one := self.pursued.of(goal.id):
+            self.exclusions.note(one.tree.control)
             return not one.is_outdated and one.tree.needs_replan is None
         tried = self._tried.get(goal.number)
         if tried is None:
@@ -286,21 +179,10 @@ class Pursuit:
     def _next(self) -> GivenGoal | None:
         due = [goal for goal in self.queue.open() if not self._is_on_its_way(goal)]
         searched = next(filter(self._is_searched_for, due), None)
-        return self._turns.next(due, searched, self._pursued)
+        return self._turns.next(due, searched, self.pursued)
 
     def _is_searched_for(self, goal: GivenGoal) -> bool:
-        asked = self._searched_for
-        return asked is not None and asked.is_like(self._situation(goal.id))
-
-    def _exclude(self, control: PlanExecutive) -> None:
-        now_s = self._now_s()
-        for name in control.exhausted:
-            self._failures[name] = control.attempts.given_up(name) or ""
-            if self._excluded_until_s.get(name, 0.0) <= now_s:
-                attempts = control.attempts
-                reason, failures = attempts.last_failure(name), attempts.count(name)
-                setback = self.setbacks.note(name, failures, reason)
-                self._excluded_until_s[name] = now_s + setback.cool_down_s
+        return self._search.is_for(self._situation(goal.id))
 
     def _start_search(self, wanted: GivenGoal) -> None:
         assert self._composition is not None  # `step` waits for one
@@ -308,37 +190,29 @@ class Pursuit:
         if self._tried.get(wanted.number) == situation:
             self._give_up_plan(wanted)
             return
-        self._cancel_search()
-        self._searched_for = situation
-        self._search = asyncio.create_task(
+        self._search.start(
+            situation,
             search(
                 self._planners,
                 self._composition,
                 wanted,
                 situation,
                 deadline_s=self._deadline_s,
-                past=Past(self.seen, dict(self._failures), dict(self._left_out)),
-            )
+                past=Past(self.seen, self.exclusions.all_failures, dict(self._left_out)),
+            ),
         )
-        self._search.add_done_callback(lambda _: self._wake())
 
     def _give_up_plan(self, wanted: GivenGoal) -> None:
         """The plan at hand is stuck, and nothing new is known that another could be made of."""
-        one = self._pursued.get(wanted.id)
+        one = self.pursued.of(wanted.id)
         why = one.tree.needs_replan if one else None
         problem = Problem("PLAN_STUCK", why or "its plan does not go on", where=f"goal {wanted.id}")
         self._suspend(NoPlan(self._situation(wanted.id), (problem,)))
 
-    def _cancel_search(self) -> None:
-        if self._search is not None:
-            self._search.cancel()
-            self._search = self._searched_for = None
-
     def _take_found(self) -> None:
-        if self._search is None or self._searched_for is None or not self._search.done():
+        found = self._search.take()
+        if found is None:
             return
-        found = self._outcome(self._search, self._searched_for)
-        self._search = self._searched_for = None
         goal = found.situation.goal
         if self.queue[goal].state.is_final or not found.situation.is_like(self._situation(goal)):
             return
@@ -362,26 +236,17 @@ class Pursuit:
         kept_out(self._people, known, now)
         self._left_out = dict(left_out)
 
-    def _outcome(self, search: asyncio.Task[Outcome], asked: Situation) -> Outcome:
-        """What a search came to; a fault in planning is contained, and told like a missing plan."""
-        error = search.exception()
-        if error is None:
-            return search.result()
-        log.error("a search for a plan failed", exc_info=error)
-        problem = Problem("PLANNING_FAULT", f"planning failed: {type(error).__name__}: {error}")
-        return NoPlan(asked, (problem,))
-
     def _still_works(self, found: Planned) -> bool:
         assert self._composition is not None  # there was a search
         beside = {other.goal for other in found.beside}
-        believed = self._facts_with(one for one in self.pursued if one.goal in beside)
-        lasting = self._composition.merged.lasting()
-        return replayed(found.task, found.names, believed, lasting) is not None
+        going_on = [one for one in self.pursued if one.goal in beside]
+        believed = self._situations.facts_beside.of(going_on)
+        return still_works(self._composition, found, believed)
 
     def _suspend(self, found: NoPlan) -> None:
         goal = self.queue[found.situation.goal]
         self._tried[goal.number] = found.situation
-        self.drop("there is no plan any more", goal.id)
+        self.pursued.drop("there is no plan any more", goal.id)
         if goal.state is not GoalState.SUSPENDED or goal.problems != found.problems:
             words = "; ".join(problem.message for problem in found.problems)
             fixes = "; ".join(problem.fix for problem in found.problems if problem.fix)
@@ -392,7 +257,7 @@ class Pursuit:
 
     def _wait(self, found: Waits) -> None:
         goal = self.queue[found.situation.goal]
-        self.drop("more urgent goals need what it uses", goal.id)
+        self.pursued.drop("more urgent goals need what it uses", goal.id)
         newer = (id for id in found.behind if is_replaced(goal, self.queue[id]))
         first = next(newer, next(iter(found.behind)))
         self._put_aside(goal.id, first, found.behind[first])
@@ -412,12 +277,14 @@ class Pursuit:
         reason = self._why_another_plan(goal.id)
         handed_over: list[Run] = []
         for id, shared in found.puts_aside.items():
-            if one := self._pursued.pop(id, None):
-                handed_over += one.tree.release()
+            runs = self.pursued.release(id)
+            if runs is not None:
+                handed_over += runs
                 self._tried.pop(self.queue[id].number, None)  # it is put aside, not given up
                 self._put_aside(id, goal.id, shared)
         # Without those that it put aside the answer is the same.
-        self._tried[goal.number] = replace(found.situation, others=self._other_plans(goal.id))
+        others = self._situations.other_plans(goal.id)
+        self._tried[goal.number] = replace(found.situation, others=others)
         self.queue.put(goal.id, GoalState.ACTIVE)
         self._grow(goal.id, found.task, found.plan, runs=handed_over)
         called = short_names.steps(found.names, {})
@@ -427,7 +294,7 @@ class Pursuit:
         self._emit(PlanMade(goal.id, found.situation.revision, found.names, reason))
 
     def _why_another_plan(self, goal: str) -> str:
-        one = self._pursued.get(goal)
+        one = self.pursued.of(goal)
         return (one.tree.needs_replan or "the components changed") if one else ""
 
     def _grow(
@@ -442,8 +309,9 @@ class Pursuit:
         """Put the tree of a plan in the place of the present one of that goal; `runs` are those of
         goals that are put aside."""
         assert self._composition is not None  # there is a task
-        before = self._pursued.get(id)
-        halting = [run for run in self.runs if run.is_halting]  # units may not be free before
+        before = self.pursued.of(id)
+        # Units may not be free before what is halted has ended.
+        halting = [run for run in self.pursued.runs if run.is_halting]
         own = before.tree.release() if before else ()
         goal, exclusive = self.queue[id], self._composition.exclusive
         tree = TaskTree(
@@ -454,37 +322,17 @@ class Pursuit:
             kind=goal.kind,
             sight=lambda: (self._beliefs.world, self._now_s()),
             exclusive=exclusive,
-            runs=_once((*own, *runs, *halting)),
+            runs=each_once((*own, *runs, *halting)),
             patience=self._patience,
-            setbacks=self.setbacks,
+            setbacks=self.exclusions.setbacks,
             name=f"goal {goal.id}",
         )
-        kept = tree.control.regression
-        reservation = Reservation.of(id, kept.steps, kept.goal, exclusive)
-        self._pursued[id] = Pursued(id, task, plan, tree, reservation, phase=phase)
-
-    def _replayed(self, composition: Composition, one: Pursued) -> tuple[GroundTask, Plan] | None:
-        """The plan in the new composition, if what is left of it still reaches the goal there."""
-        given = self.queue[one.goal]
-        try:
-            goal = parse_goal(given.pddl, composition.merged, kind=given.kind)
-        except GoalRefused:
-            return None
-        try:
-            task = task_of(composition, goal, self._situation(one.goal))
-        except FragmentRefused:  # too many ways: the plan at hand goes on, guarded as before
-            task = one.task
-        believed = self._beliefs.world.facts
-        plan = replayed(task, one.names, believed, composition.merged.lasting())
-        return None if plan is None else plain(beginning_at(task, believed), plan)
+        left = tree.control.regression
+        reservation = Reservation.of(id, left.steps, left.goal, exclusive)
+        self.pursued.put(Pursued(id, task, plan, tree, reservation, phase=phase))
 
 
 _WAITS = {GoalState.QUEUED: "", GoalState.HALTED: "is "}
-
-
-def _once(runs: Iterable[Run]) -> tuple[Run, ...]:
-    """Each run once: those that are being halted are known to every tree."""
-    return tuple({id(run): run for run in runs}.values())
 
 
 def _parts(composition: Composition) -> tuple[object, ...]:

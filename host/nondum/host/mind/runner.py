@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
-from nondum.host.core.events import (
+from nondum.host.core.events.behaviours import (
     BehaviourEnded,
     BehaviourEstablished,
     BehaviourProgressed,
-    Event,
-    FactForgotten,
-    FactKnown,
-    WorkerExited,
 )
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.facts import FactForgotten, FactKnown
+from nondum.host.core.events.workers import WorkerExited
 from nondum.host.mind.beliefs import Beliefs
 from nondum.host.mind.composition import Composition
 from nondum.planning.execute.running import RunState

@@ -82,7 +82,7 @@ class TreeView:
             "phase": control.phase.value,
             "steps": len(tree.steps),
             "left": control.rest.steps.bit_count(),
-            "excluded": sorted(self._pursuit.excluded),
+            "excluded": sorted(self._pursuit.exclusions.excluded),
         }
         if one := self._pursued(tree):
             goal = self._queue[one.goal]
@@ -215,7 +215,7 @@ class TreeView:
         actions = composition.merged.domain.actions
         return [
             name
-            for name in sorted(self._pursuit.excluded)
+            for name in sorted(self._pursuit.exclusions.excluded)
             if (schema := name.split(" ")[0]) in actions
             and needed & {atom.predicate for atom in actions[schema].effect.added()}
         ]

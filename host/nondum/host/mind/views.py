@@ -9,7 +9,8 @@ from typing import Protocol
 
 from py_trees.behaviour import Behaviour as Node
 
-from nondum.host.core.records import ComponentRecord, PeerComponent
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.peer import PeerComponent
 from nondum.host.mind import evidence, offers, short_names
 from nondum.host.mind.announcements import People
 from nondum.host.mind.beliefs import Beliefs
@@ -195,7 +196,7 @@ class Views:
             ],
             "names": {id: asdict(names) for id, names in beliefs.snapshot.names.items()},
             "facts": sorted(beliefs.world.bare_facts),
-            "excluded": pursuit.failures,
+            "excluded": pursuit.exclusions.failures,
             "silence": Silence.of(beliefs.snapshot).to_dict(),
             "seen": [
                 {

@@ -11,7 +11,9 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
 
-from nondum.host.core.events import Event, GoalEnded, GoalReached, PeerJoined, PeerLeft, PlanMissing
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.goals import GoalEnded, GoalReached, PlanMissing
+from nondum.host.core.events.peers import PeerJoined, PeerLeft
 from nondum.host.core.plain import Row
 from nondum.host.core.printable import printable
 from nondum.host.mind.goals import HIGHEST_PRIORITY

@@ -19,8 +19,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from nondum.host.core.events import FactKnown, StreamFlowing
-from nondum.host.core.records import ComponentRecord, Snapshot
+from nondum.host.core.events.facts import FactKnown, StreamFlowing
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.planning.merge.scope import SELF
 from nondum.planning.pddl.facts import fact

@@ -12,9 +12,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from nondum.host.core.events import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
 from nondum.host.core.printable import printable
-from nondum.host.core.records import MountPose, PeerComponent, PeerRecord, Xyz
+from nondum.host.core.records.mount import MountPose, Xyz
+from nondum.host.core.records.peer import PeerComponent, PeerRecord
 from nondum.planning.merge.contribution import peers_id
 from nondum.planning.merge.core import TAKEN_PREDICATES
 from nondum.planning.pddl.facts import parts

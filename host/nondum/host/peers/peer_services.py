@@ -10,7 +10,9 @@ from typing import Any
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.host_config import HostConfig, PeersSection
 from nondum.host.control.arguments import Arguments
-from nondum.host.core.events import CertificatesBrought, Emit, Event, UnitsTaken
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.facts import UnitsTaken
+from nondum.host.core.events.peers import CertificatesBrought
 from nondum.host.core.plain import Row
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders

@@ -10,22 +10,13 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from nondum.host.core.events import (
-    BehaviourEnded,
-    BehaviourStarted,
-    Emit,
-    Event,
-    FactForgotten,
-    FactKnown,
-    PeerJoined,
-    PeerLeft,
-    PeerShared,
-    Recomposed,
-    StreamFlowing,
-    UnitsTaken,
-    WorkerExited,
-)
-from nondum.host.core.records import Snapshot
+from nondum.host.core.events.behaviours import BehaviourEnded, BehaviourStarted
+from nondum.host.core.events.catalogue import Recomposed
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing, UnitsTaken
+from nondum.host.core.events.peers import PeerJoined, PeerLeft, PeerShared
+from nondum.host.core.events.workers import WorkerExited
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.peers.offered_entries import (
     Entries,
     Policy,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nondum.host.core.events import Emit, PeerTurnedAway
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.peers import PeerTurnedAway
 from nondum.host.core.printable import printable
 from nondum.sdk.errors import Problem
 from nondum.transport.link.token_bucket import TokenBucket

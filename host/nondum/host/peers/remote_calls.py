@@ -8,7 +8,8 @@ import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from nondum.host.core.events import BehaviourProgressed, Emit, Event
+from nondum.host.core.events.behaviours import BehaviourProgressed
+from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.printable import printable
 from nondum.host.mind.runner import Call as RunCall
 from nondum.host.mind.runner import Calls, FactValue

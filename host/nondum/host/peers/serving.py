@@ -11,8 +11,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from nondum.host.core.events import BehaviourEnded, BehaviourEstablished, BehaviourProgressed, Event
-from nondum.host.core.records import Snapshot
+from nondum.host.core.events.behaviours import (
+    BehaviourEnded,
+    BehaviourEstablished,
+    BehaviourProgressed,
+)
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.peers.offered_entries import Policy
 from nondum.host.peers.uses import taken_by

@@ -11,7 +11,8 @@ from typing import Any
 from nondum.host.control.arguments import Arguments
 from nondum.host.core.plain import Row
 from nondum.host.core.printable import printable
-from nondum.host.core.records import PeerRecord, Snapshot
+from nondum.host.core.records.peer import PeerRecord
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.transport.discovery import DiscoveryStatus, Hint
 from nondum.transport.fleet import FleetEvent, Peer
 from nondum.transport.peers import (

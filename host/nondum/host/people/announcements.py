@@ -6,47 +6,50 @@ from collections.abc import Iterable, Iterator
 
 from packaging.version import Version
 
-from nondum.host.core.events import (
-    BesideRefused,
+from nondum.host.core.events.catalogue import (
     CatalogueSetAside,
     CatalogueUnwritten,
     CatalogueWritten,
-    ClockDoubted,
-    ClockRight,
-    ConditionEnded,
+)
+from nondum.host.core.events.daemon import SafeModeEntered, SafeModeLeft
+from nondum.host.core.events.drives import (
     DriveFlapping,
     DriveLeftAlone,
     DriveRead,
     DriveRetried,
     DriveUnreadable,
-    Event,
-    InputAmbiguous,
+)
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.inputs import InputAmbiguous
+from nondum.host.core.events.payloads import (
     PayloadActivated,
-    PayloadDistrusted,
-    PayloadDoubted,
     PayloadFailed,
-    PayloadPlaced,
     PayloadRefused,
-    PayloadResumed,
+    PayloadWithdrawn,
+    RetryAsked,
+    WheelsStored,
+)
+from nondum.host.core.events.peers import PeerJoined, PeerLeft, PeerTurnedAway
+from nondum.host.core.events.placement import (
+    PayloadPlaced,
     PayloadSentAway,
     PayloadTaken,
-    PayloadWithdrawn,
-    PeerJoined,
-    PeerLeft,
-    PeerTurnedAway,
     PlaceLost,
     PlaceMissing,
-    RetryAsked,
-    RollbackAsked,
-    SafeModeEntered,
-    SafeModeLeft,
+)
+from nondum.host.core.events.releases import BesideRefused, PayloadResumed, RollbackAsked
+from nondum.host.core.events.trust import (
+    ClockDoubted,
+    ClockRight,
+    PayloadDistrusted,
+    PayloadDoubted,
     TrustChanged,
     TrustFileRefused,
-    WheelsStored,
-    WorkerFaulted,
-    WorkerStrained,
 )
-from nondum.host.core.records import PayloadRecord, Snapshot, Step
+from nondum.host.core.events.workers import ConditionEnded, WorkerFaulted, WorkerStrained
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.sdk.errors import Problem
 
 

@@ -7,7 +7,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable
 
 from nondum.host.core import missing_devices
-from nondum.host.core.records import PayloadRecord
+from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.status import is_at_rest
 from nondum.host.mind.mind import Mind
 from nondum.host.people.answers import abilities, activity

@@ -14,9 +14,14 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from nondum.host.core.elsewhere import Elsewhere
-from nondum.host.core.events import Emit, Event, GoalEnded, HostStarted, PayloadActivated
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.goals import GoalEnded
+from nondum.host.core.events.payloads import PayloadActivated
 from nondum.host.core.feedback_state import State, StateReason
-from nondum.host.core.records import GoalRecord, Snapshot, Step
+from nondum.host.core.records.goal import GoalRecord
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.core.status import coming_in
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.host.mind.mind import Mind

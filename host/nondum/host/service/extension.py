@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nondum.host.core.events import Emit
+from nondum.host.core.events.event import Emit
 from nondum.host.extension.hookspecs import Host, hookimpl
 from nondum.host.service import journal
 from nondum.host.service.journal_messages import JournalMessages

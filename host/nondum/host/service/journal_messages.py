@@ -5,20 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 
-from nondum.host.core.events import (
-    DriveInserted,
-    DriveRemoved,
-    Event,
-    GoalEnded,
-    GoalGiven,
-    GoalReached,
-    HostStarted,
-    HostStopped,
-    PayloadActivated,
-    WorkerExited,
-    WorkerLogged,
-)
-from nondum.host.core.records import Snapshot
+from nondum.host.core.events.daemon import HostStarted, HostStopped
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.goals import GoalEnded, GoalGiven, GoalReached
+from nondum.host.core.events.payloads import PayloadActivated
+from nondum.host.core.events.workers import WorkerExited, WorkerLogged
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.people.announcements import announced
 from nondum.sdk.errors import Problem
 

@@ -12,7 +12,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from nondum.host.core.events import Event, HostStarted
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.event import Event
 from nondum.host.service.notify import Notifier
 
 SIGNS = 4

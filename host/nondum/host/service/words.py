@@ -7,7 +7,8 @@ from typing import Any
 
 from nondum.host.control.rows import host_state, problems_of
 from nondum.host.core.printable import printable
-from nondum.host.core.records import Safety, Snapshot
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
 
 _DOES = {"active": "does", "suspended": "cannot yet"}
 """State of a goal → what is said of it."""

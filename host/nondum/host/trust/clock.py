@@ -6,7 +6,8 @@ import asyncio
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from nondum.host.core.events import ClockDoubted, ClockRight, Emit
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.trust import ClockDoubted, ClockRight
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.trust.judging import clock_unsure
 from nondum.wheelhouse.trust.trust import Trust

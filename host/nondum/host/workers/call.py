@@ -6,7 +6,12 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from nondum.host.core.events import BehaviourEnded, BehaviourEstablished, BehaviourStarted, Emit
+from nondum.host.core.events.behaviours import (
+    BehaviourEnded,
+    BehaviourEstablished,
+    BehaviourStarted,
+)
+from nondum.host.core.events.event import Emit
 from nondum.planning.execute.running import RunState
 
 

@@ -8,7 +8,10 @@ from nondum.host.config import confinement_level
 from nondum.host.config.confinement_level import ConfinementState, Wanted
 from nondum.host.sandbox.levels import bubblewrap
 from nondum.host.workers import confinement_probe
-from nondum.host.workers.confinements import Boxed, Confinement, Held, Unconfined
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
+from nondum.host.workers.unconfined import Unconfined
 from nondum.sdk.errors import ConfigRefused
 from nondum.wheelhouse.format.confinement import Level
 

@@ -20,7 +20,9 @@ from nondum.host.config.confinement_level import Finding
 from nondum.host.sandbox.helper import privileged
 from nondum.host.sandbox.levels import bubblewrap, landlock, refusals, visibility
 from nondum.host.workers import scratch
-from nondum.host.workers.confinements import Boxed, Confinement, Held
+from nondum.host.workers.boxed import Boxed
+from nondum.host.workers.confinement import Confinement
+from nondum.host.workers.held import Held
 from nondum.host.workers.launcher import parameters
 from nondum.host.workers.spare import Spare
 from nondum.host.workers.spec import WorkerSpec, base_interpreter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nondum.host.core.events import WorkerFaulted
+from nondum.host.core.events.workers import WorkerFaulted
 from nondum.sdk.errors import Problem
 
 SHOWN = 3

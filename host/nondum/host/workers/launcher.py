@@ -1,6 +1,6 @@
 """How a worker's process is started: an interpreter on some ground, which then becomes a worker.
 
-What holds it is the confinement's matter (`confinements.py`). All levels have a session of its
+What holds it is the confinement's matter (`confinement.py`). All levels have a session of its
 own, resource limits, no new privileges, and nothing inherited but the link.
 """
 
@@ -18,10 +18,11 @@ from typing import Any, Protocol
 from nondum.host.sandbox.cgroups import Cgroups
 from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.workers import problems, scratch
-from nondum.host.workers.confinements import Confinement, Entry, Unconfined
+from nondum.host.workers.confinement import Confinement, Entry
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spare import PLACEHOLDER, PLACEHOLDER_BYTES, Spare
 from nondum.host.workers.spec import Timing, WorkerSpec
+from nondum.host.workers.unconfined import Unconfined
 from nondum.sdk.errors import Problem, WorkerFailed
 from nondum.wheelhouse.format.confinement import Level
 

@@ -11,8 +11,10 @@ import contextlib
 import os
 import signal
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
+from nondum.host.sandbox.cgroups import Cgroup
 from nondum.host.workers.launcher import MARK, owner_mark
 from nondum.host.workers.spare import OWNER
 
@@ -33,6 +35,13 @@ def end_leftovers(folder: Path) -> int:
         if not found:
             break
     return len(ended)
+
+
+def ends_of_all(cgroup: Cgroup | None, folder: Path) -> list[Callable[[], object]]:
+    """What ends all that the process of a worker has started, if its scratch folder is `folder`;
+    each may block, and raise `OSError`."""
+    by_cgroup = [] if cgroup is None else [cgroup.end]
+    return [*by_cgroup, partial(end_leftovers, folder)]
 
 
 def clear_away(*steps: Callable[[], object]) -> None:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from nondum.host.core.records import Moment
+from nondum.host.core.records.moment import Moment
 
 LINES = 1000
 """Lines that are kept of one component."""

@@ -7,13 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from nondum.host.core.events import (
-    FactForgotten,
-    FactKnown,
-    StreamFlowing,
-    WorkerFaulted,
-    WorkerLogged,
-)
+from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
+from nondum.host.core.events.workers import WorkerFaulted, WorkerLogged
 from nondum.host.core.placed import placed
 from nondum.host.core.printable import printable, printable_text
 from nondum.sdk.description import PluginDescription

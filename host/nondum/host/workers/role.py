@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 
-from nondum.host.core.events import Event, TrialFailed, WorkerLogged
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.releases import TrialFailed
+from nondum.host.core.events.workers import WorkerLogged
 
 
 class Role(Enum):

@@ -24,7 +24,7 @@ from nondum.host.sandbox.cgroups import Cgroup, CgroupLimits, Cgroups
 from nondum.host.sandbox.helper import privileged
 from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.sandbox.levels.users import NewNamespace
-from nondum.host.workers.confinements import Confinement
+from nondum.host.workers.confinement import Confinement
 from nondum.host.workers.init_link import CREDENTIALS, InitLink
 from nondum.host.workers.process import WorkerProcess
 from nondum.host.workers.spec import Limits

@@ -93,6 +93,11 @@ class WorkerSpec:
     permissions: tuple[str, ...] = ()
     limits: Limits = Limits()
 
+    @property
+    def package(self) -> str:
+        """Name of the plugin's own package or module."""
+        return self.entry_point.partition(":")[0].partition(".")[0]
+
     def units(self, host: str) -> dict[str, str]:
         """Local name of each unit → its object."""
         return {u.name: object_name(host, self.component, u.name) for u in self.index.units}

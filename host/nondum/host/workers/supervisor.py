@@ -7,8 +7,10 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from nondum.host.core import events
-from nondum.host.core.events import Event
+from nondum.host.core.events import workers as worker_events
+from nondum.host.core.events.event import Event
+from nondum.host.core.events.releases import TrialFailed
+from nondum.host.core.events.workers import WorkerExited, WorkerReady, WorkerStable
 from nondum.host.core.shielded import until_done
 from nondum.host.workers import problems, supervision
 from nondum.host.workers.in_flight import Search
@@ -16,7 +18,8 @@ from nondum.host.workers.launcher import Launcher
 from nondum.host.workers.role import EMITTED, Role
 from nondum.host.workers.spec import Timing, WorkerSpec
 from nondum.host.workers.supervision import Supervision
-from nondum.host.workers.worker import Worker, start_worker
+from nondum.host.workers.worker import Worker
+from nondum.host.workers.worker_start import start_worker
 from nondum.sdk.errors import Problem, WorkerFailed
 
 log = logging.getLogger(__name__)
@@ -96,7 +99,7 @@ class Supervisor:
         self.role = Role.ACTIVE
         if self._worker is not None:
             self._household.on_ready(self._worker)
-            self._worker.tell_conditions()
+            self._worker.reports.tell_conditions()
 
     def withdraw(self) -> None:
         """Take it out of use; `stop` it next."""
@@ -130,10 +133,10 @@ class Supervisor:
             if self.is_stopping:
                 return
             if self.role is Role.BESIDE:
-                self._emit(events.TrialFailed(self.spec.payload, self.spec.component, (problem,)))
+                self._emit(TrialFailed(self.spec.payload, self.spec.component, (problem,)))
                 return
             component, payload = self.spec.component, self.spec.payload
-            self._emit(events.WorkerExited(component, str(problem), payload, problem))
+            self._emit(WorkerExited(component, str(problem), payload, problem))
             if not await self._restart(problem):
                 return
 
@@ -155,7 +158,7 @@ class Supervisor:
             async with asyncio.timeout(supervision.WINDOW_S):
                 return await asyncio.shield(worker.gone)
         except TimeoutError:
-            self._emit(events.WorkerStable(self.spec.component, self.spec.payload))
+            self._emit(WorkerStable(self.spec.component, self.spec.payload))
             return await asyncio.shield(worker.gone)
 
     async def _restart(self, problem: Problem) -> bool:
@@ -178,7 +181,9 @@ class Supervisor:
         problem = problems.crash_loop(
             self.spec.component, supervision.RESTARTS, supervision.WINDOW_S, last
         )
-        self._emit(events.WorkerFailed(self.spec.component, (problem, last), self.spec.payload))
+        self._emit(
+            worker_events.WorkerFailed(self.spec.component, (problem, last), self.spec.payload)
+        )
 
     async def _start_worker(self) -> None:
         household = self._household
@@ -195,8 +200,8 @@ class Supervisor:
         )
         if self.role is Role.ACTIVE:
             household.on_ready(self._worker)
-        self._emit(events.WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
-        self._worker.tell_conditions()
+        self._emit(WorkerReady(self.spec.component, self.spec.index, self.spec.payload))
+        self._worker.reports.tell_conditions()
 
     def _emit(self, event: Event) -> None:
         """Tell what has happened, as far as it is anybody's business."""

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from nondum.host.sandbox.cgroups import Cgroup, Usage
 from nondum.host.sandbox.inside import open_files
+from nondum.host.workers import scratch
+from nondum.host.workers.init_link import OpenFiles
+from nondum.host.workers.limits import Reading
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 
@@ -43,6 +46,28 @@ class UsageReader:
     def descriptors(self) -> int:
         """Open files of that process of its which has most, as far as they may be counted."""
         return open_files.most(self.pids())
+
+    def reading(
+        self, told: OpenFiles | None, folder: Path, now_s: Callable[[], float], *, is_asked: bool
+    ) -> Reading:
+        """All of it, for a worker whose scratch folder is `folder`. Blocks.
+
+        `told` is what its init says of open files, where this process cannot look at them.
+        """
+        if told is None:
+            descriptors = self.descriptors()
+            used = scratch.used_bytes(folder, self.pids())
+        else:
+            descriptors = told.descriptors
+            used = scratch.used_bytes(folder) + told.deleted_bytes
+        return Reading(
+            at_s=now_s(),
+            usage=self.usage(),
+            descriptors=descriptors,
+            wanted_s=self.wanted_s(),
+            scratch_bytes=used,
+            is_asked=is_asked,
+        )
 
 
 def _wanted_s(pid: int) -> Iterator[tuple[int, float]]:

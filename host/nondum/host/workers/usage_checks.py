@@ -6,7 +6,8 @@ import asyncio
 import os
 from collections.abc import Callable, Iterable
 
-from nondum.host.core.events import Emit, WorkerStrained
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.workers import WorkerStrained
 from nondum.host.workers.worker import Worker
 
 GLANCE_S = 0.5

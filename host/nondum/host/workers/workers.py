@@ -9,16 +9,11 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
-from nondum.host.core.events import (
-    Emit,
-    Event,
-    FactKnown,
-    InputAmbiguous,
-    StreamFlowing,
-    WorkerFailed,
-    WorkerLogged,
-)
-from nondum.host.core.records import Moment
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.facts import FactKnown, StreamFlowing
+from nondum.host.core.events.inputs import InputAmbiguous
+from nondum.host.core.events.workers import WorkerFailed, WorkerLogged
+from nondum.host.core.records.moment import Moment
 from nondum.host.workers import problems
 from nondum.host.workers.call import Call
 from nondum.host.workers.extra_workers import ExtraWorkers, Granted
@@ -212,7 +207,7 @@ class Workers:
         """Stream → messages a second of late, as the workers say."""
         told: dict[str, float] = {}
         for worker in self._running():
-            told |= worker.rates
+            told |= worker.reports.rates
         return told
 
     def busy(self) -> frozenset[str]:
@@ -268,21 +263,21 @@ class Workers:
         supervisor = self._supervisors.get(component)
         if supervisor is None or supervisor.worker is None:
             return ()
-        return tuple(supervisor.worker.claims)
+        return tuple(supervisor.worker.reports.claims)
 
     def faults(self, component: str) -> tuple[Problem, ...]:
         """Mistakes of a component's plugin that its worker has outlived, the newest of those that
         have not ended a condition."""
         supervisor = self._supervisors.get(component)
         worker = supervisor.worker if supervisor is not None else None
-        return tuple(worker.faults) if worker is not None else ()
+        return tuple(worker.reports.faults) if worker is not None else ()
 
     def dead_conditions(self, component: str, payload: str) -> tuple[errors.Problem, ...]:
         """The conditions of a payload's worker that have ended with an error."""
         supervisor = self._found(component, payload)
         if supervisor is None or supervisor.worker is None:
             return ()
-        return tuple(supervisor.worker.dead_conditions.values())
+        return tuple(supervisor.worker.reports.dead_conditions.values())
 
     async def ask(
         self, component: str, hook: str, body: Mapping[str, Any]
@@ -350,7 +345,7 @@ class Workers:
         """A worker may be asked for things from now on."""
         spec = worker.spec
         self.streams.join(spec.component, worker.link, spec.index)
-        for claim in worker.claims:
+        for claim in worker.reports.claims:
             if isinstance(claim, StreamFlowing):
                 self.streams.set_flowing(claim.stream, is_flowing=True)
         self._links[spec.component] = worker.link

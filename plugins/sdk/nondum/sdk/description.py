@@ -7,12 +7,13 @@ inverse to each other.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import resources
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, cast
 
+from nondum.sdk.codec.checks import Mismatch
+from nondum.sdk.codec.values import OMIT_DEFAULT, from_plain, to_plain
 from nondum.sdk.errors import Problem, WorkerFailed
 
 ACTUATORS = frozenset({"base", "pointer", "arm", "gripper"})
@@ -24,7 +25,7 @@ WHEN_LOST = ("stop", "hold", "finish")
 for it again. `finish`: it goes on to its end; a lasting behaviour has none, so it is held."""
 
 
-_ADDED = {"added": True}
+_ADDED = OMIT_DEFAULT
 """Of keys that were added after others had been released: hosts of before refuse what they do not
 know, so such a key is written only where an author has said something in it."""
 
@@ -159,7 +160,7 @@ class PluginDescription:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON and msgpack, lists for tuples."""
-        return _plain(self)  # type: ignore[no-any-return]  # a dataclass always gives a dict
+        return cast(dict[str, Any], to_plain(self))
 
     @classmethod
     def parse(cls, data: object, *, where: str) -> PluginDescription:
@@ -167,67 +168,10 @@ class PluginDescription:
 
         Raises `WorkerFailed` (DESCRIPTION_INVALID) that names the place in `where`.
         """
-        return _parse(cls, data, where)
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        said = ((key, getattr(value, key.name)) for key in dataclasses.fields(value))
-        return {
-            key.name: _plain(one)
-            for key, one in said
-            if "added" not in key.metadata or one != key.default
-        }
-    if isinstance(value, tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, Mapping):
-        return dict(value)
-    return value
-
-
-_T = TypeVar("_T")
-
-
-def _parse(cls: type[_T], data: object, where: str) -> _T:
-    if not isinstance(data, Mapping):
-        raise _invalid(where, f"expected a table for {cls.__name__}, found {type(data).__name__}")
-    hints = get_type_hints(cls)
-    unknown = sorted(str(key) for key in data if key not in hints)
-    if unknown:
-        raise _invalid(where, f"unknown key {unknown[0]!r}; known: {', '.join(sorted(hints))}")
-    fields = dataclasses.fields(cls)  # type: ignore[arg-type]  # only called with dataclasses
-    missing = [f.name for f in fields if f.default is dataclasses.MISSING and f.name not in data]
-    if missing:
-        raise _invalid(where, f"key {missing[0]!r} is missing")
-    return cls(**{k: _value(hints[k], v, f"{where}.{k}") for k, v in data.items()})
-
-
-def _value(hint: Any, data: object, where: str) -> Any:
-    origin = get_origin(hint)
-    if origin is tuple:
-        if not isinstance(data, list | tuple):
-            raise _invalid(where, f"expected a list, found {type(data).__name__}")
-        item = get_args(hint)[0]
-        return tuple(_value(item, value, f"{where}[{i}]") for i, value in enumerate(data))
-    if origin is not None:  # Mapping[str, str]
-        if not isinstance(data, Mapping) or not all(
-            isinstance(k, str) and isinstance(v, str) for k, v in data.items()
-        ):
-            raise _invalid(where, "expected a table of strings")
-        return dict(data)
-    if dataclasses.is_dataclass(hint):
-        return _parse(hint, data, where)  # type: ignore[arg-type]  # is_dataclass also admits instances
-    if type(data) is not hint:
-        raise _invalid(where, f"expected {hint.__name__}, found {type(data).__name__}")
-    return data
-
-
-def _invalid(where: str, message: str) -> WorkerFailed:
-    return WorkerFailed(
-        Problem(
-            "DESCRIPTION_INVALID",
-            message,
-            where=where,
-            fix="build the payload again with the SDK that the host knows",
-        )
-    )
+        try:
+            return from_plain(cls, data, where)
+        except Mismatch as mismatch:
+            fix = "build the payload again with the SDK that the host knows"
+            raise WorkerFailed(
+                Problem("DESCRIPTION_INVALID", mismatch.reason, where=mismatch.place, fix=fix)
+            ) from None

@@ -31,9 +31,11 @@ A mistake in calling code stays `TypeError` or `ValueError`; these say that the 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
+from typing import cast
 
 from nondum.sdk import codes
+from nondum.sdk.codec.values import OMIT_DEFAULT, to_plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +46,13 @@ class Problem:
     """Stable identifier, for example `WHEEL_RECORD` or `PDDL_ARITY`."""
     message: str
     """What was found, and what was expected, in one sentence."""
-    where: str = ""
+    where: str = field(default="", metadata=OMIT_DEFAULT)
     """File, place in it, component or drive."""
-    need: str = ""
+    need: str = field(default="", metadata=OMIT_DEFAULT)
     """What is needed, where that can be measured."""
-    have: str = ""
+    have: str = field(default="", metadata=OMIT_DEFAULT)
     """What is there."""
-    fix: str = ""
+    fix: str = field(default="", metadata=OMIT_DEFAULT)
     """What a person can do about it; what is known of the code, if nothing better is said."""
 
     def __post_init__(self) -> None:
@@ -71,7 +73,7 @@ class Problem:
         >>> Problem("GOAL_TOO_EARLY", "not yet").to_dict()
         {'code': 'GOAL_TOO_EARLY', 'message': 'not yet', 'fix': 'ask again in a second'}
         """
-        return {key: value for key, value in asdict(self).items() if value}
+        return cast(dict[str, str], to_plain(self))
 
 
 class NondumError(Exception):

@@ -7,19 +7,16 @@ or raises `ProtocolViolation`, and never makes more memory of a packet than its 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, get_args
 
 import msgpack
 
+from nondum.sdk.codec.checks import Bounds
 from nondum.sdk.errors import Problem, ProtocolViolation
-from nondum.sdk.wire_fields import (
-    read_body,
-    read_number,
-    read_problem,
-    read_text,
-)
+from nondum.sdk.packet_codec import PacketCodec
+from nondum.sdk.wire_fields import Name, Number
 
 PROTOCOL_VERSIONS: tuple[int, ...] = (1,)
 """Versions that this SDK speaks, newest first. A host speaks its own and the one before."""
@@ -38,18 +35,18 @@ Body: TypeAlias = Mapping[str, Any]
 class Hello:
     """The worker's first packet."""
 
-    versions: tuple[int, ...]
+    versions: Annotated[tuple[Number, ...], Bounds(1, MAX_ITEMS)]
     """Protocol versions that it speaks."""
-    sdk: str
+    sdk: Name
     """Version of its nondum-sdk."""
-    pid: int
+    pid: Number
 
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
     """The host's answer: the version to speak, and what the worker needs to know of its place."""
 
-    version: int
+    version: Number
     body: Body
 
 
@@ -57,8 +54,8 @@ class Welcome:
 class Request:
     """Asks the other end to do something; answered by one Reply or Failure of the same id."""
 
-    id: int
-    verb: str
+    id: Number
+    verb: Name
     body: Body
 
 
@@ -66,7 +63,7 @@ class Request:
 class Reply:
     """A request was carried out."""
 
-    id: int
+    id: Number
     body: Body
 
 
@@ -74,16 +71,16 @@ class Reply:
 class Failure:
     """A request failed, or was halted (code HALTED)."""
 
-    id: int
-    problems: tuple[Problem, ...]
+    id: Number
+    problems: Annotated[tuple[Problem, ...], Bounds(1, MAX_ITEMS)]
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something happened; not answered."""
 
-    name: str
-    call_id: int | None
+    name: Name
+    call_id: Number | None
     """The request that it belongs to."""
     body: Body
 
@@ -92,10 +89,14 @@ class Event:
 class Cancel:
     """Halt a request; the answer still comes."""
 
-    id: int
+    id: Number
 
 
 WireMessage: TypeAlias = Hello | Welcome | Request | Reply | Failure | Event | Cancel
+"""The number of a kind in packets is its place here."""
+
+
+_PACKETS: PacketCodec[WireMessage] = PacketCodec(get_args(WireMessage))
 
 
 def encode(message: WireMessage) -> bytes:
@@ -104,37 +105,12 @@ def encode(message: WireMessage) -> bytes:
     Raises `ProtocolViolation` for what the other end would refuse (too long, too deep, NaN) and
     `TypeError` for values that are no plain data.
     """
-    match message:
-        case Hello(versions, sdk, pid):
-            fields: tuple[Any, ...] = (0, versions, sdk, pid)
-        case Welcome(version, body):
-            fields = (1, version, body)
-        case Request(id_, verb, body):
-            fields = (2, id_, verb, body)
-        case Reply(id_, body):
-            fields = (3, id_, body)
-        case Failure(id_, problems):
-            fields = (4, id_, [problem.to_dict() for problem in problems])
-        case Event(name, call_id, body):
-            fields = (5, name, call_id, body)
-        case Cancel(id_):
-            fields = (6, id_)
-    return pack(fields)
+    return pack(_PACKETS.fields(message))
 
 
 def decode(data: bytes | memoryview) -> WireMessage:
     """Read a packet. Raises `ProtocolViolation` for anything that is not one exact message."""
-    fields = unpack(data)
-    if not isinstance(fields, list) or not fields or type(fields[0]) is not int:
-        raise _violation("PACKET_KIND", "a packet is a list that begins with its kind")
-    if not 0 <= fields[0] < len(_READERS):
-        raise _violation("PACKET_KIND", f"no kind of packet has the number {fields[0]}")
-    length, read = _READERS[fields[0]]
-    if len(fields) != length:
-        raise _violation(
-            "PACKET_FIELDS", f"kind {fields[0]} has {length} fields, found {len(fields)}"
-        )
-    return read(fields)
+    return _PACKETS.message(unpack(data))
 
 
 def pack(value: Any, limit: int = MAX_PACKET) -> bytes:
@@ -172,13 +148,14 @@ def unpack(data: bytes | memoryview, limit: int = MAX_PACKET) -> Any:
 
 
 def _table(pairs: Iterable[tuple[Any, Any]]) -> dict[str, Any]:
-    listed = list(pairs)
+    listed = pairs if type(pairs) is list else list(pairs)  # msgpack in C gives a list
     table = dict(listed)
     if len(table) != len(listed):
         raise _violation("PACKET_MALFORMED", "a table has the same key twice")
     return table
 
 
+_LISTS = frozenset({list, tuple})
 _LEAVES = frozenset({str, int, bool, type(None), bytes, bytearray, memoryview})
 
 
@@ -187,79 +164,32 @@ def _check(value: Any, depth: int) -> None:
 
     Both ends run it on every packet, so leaves are passed over without a call.
     """
-    if isinstance(value, list | tuple):
-        _check_size(value, depth)
-        for item in value:
-            if type(item) not in _LEAVES:
-                _check(item, depth - 1)
-    elif isinstance(value, Mapping):
-        _check_size(value, depth)
+    kind = type(value)  # asked of all tables and lists: `isinstance` takes longer
+    if kind is dict or (kind not in _LISTS and isinstance(value, Mapping)):
+        if depth <= 0 or len(value) > MAX_ITEMS:
+            raise _oversized(value, depth)
         for key, item in value.items():
             if type(key) is not str:
                 raise _violation("PACKET_MALFORMED", f"a key is of type {type(key).__name__}")
             if type(item) not in _LEAVES:
                 _check(item, depth - 1)
+    elif kind in _LISTS or isinstance(value, list | tuple):
+        if depth <= 0 or len(value) > MAX_ITEMS:
+            raise _oversized(value, depth)
+        for item in value:
+            if type(item) not in _LEAVES:
+                _check(item, depth - 1)
     elif isinstance(value, float):
         if not math.isfinite(value):
             raise _violation("PACKET_VALUE", f"{value} is no finite number")
-    elif type(value) not in _LEAVES and not isinstance(value, str | int):  # enums are packed
-        raise TypeError(f"{type(value).__name__} is no plain data for a packet")
+    elif kind not in _LEAVES and not isinstance(value, str | int):  # enums are packed
+        raise TypeError(f"{kind.__name__} is no plain data for a packet")
 
 
-def _check_size(value: Mapping[str, Any] | Sequence[Any], depth: int) -> None:
+def _oversized(value: Mapping[str, Any] | Sequence[Any], depth: int) -> ProtocolViolation:
     if depth <= 0:
-        raise _violation("PACKET_TOO_DEEP", f"more than {MAX_DEPTH} levels")
-    if len(value) > MAX_ITEMS:
-        raise _violation("PACKET_TOO_LONG", f"{len(value)} entries, at most {MAX_ITEMS}")
-
-
-def _read_hello(fields: list[Any]) -> Hello:
-    versions = fields[1]
-    if not isinstance(versions, list) or not versions:
-        raise _violation("PACKET_FIELDS", "versions are a list of whole numbers")
-    return Hello(
-        tuple(read_number(v) for v in versions), read_text(fields[2]), read_number(fields[3])
-    )
-
-
-def _read_welcome(fields: list[Any]) -> Welcome:
-    return Welcome(read_number(fields[1]), read_body(fields[2]))
-
-
-def _read_request(fields: list[Any]) -> Request:
-    return Request(read_number(fields[1]), read_text(fields[2]), read_body(fields[3]))
-
-
-def _read_reply(fields: list[Any]) -> Reply:
-    return Reply(read_number(fields[1]), read_body(fields[2]))
-
-
-def _read_failure(fields: list[Any]) -> Failure:
-    problems = fields[2]
-    if not isinstance(problems, list) or not problems:
-        raise _violation("PACKET_FIELDS", "a failure names at least one problem")
-    return Failure(read_number(fields[1]), tuple(read_problem(problem) for problem in problems))
-
-
-def _read_event(fields: list[Any]) -> Event:
-    call_id = None if fields[2] is None else read_number(fields[2])
-    return Event(read_text(fields[1]), call_id, read_body(fields[3]))
-
-
-def _read_cancel(fields: list[Any]) -> Cancel:
-    return Cancel(read_number(fields[1]))
-
-
-_READERS: tuple[tuple[int, Callable[[list[Any]], WireMessage]], ...] = (
-    (4, _read_hello),
-    (3, _read_welcome),
-    (4, _read_request),
-    (3, _read_reply),
-    (3, _read_failure),
-    (4, _read_event),
-    (2, _read_cancel),
-)
-"""By kind: how many fields a packet has, and how they are read."""
+        return _violation("PACKET_TOO_DEEP", f"more than {MAX_DEPTH} levels")
+    return _violation("PACKET_TOO_LONG", f"{len(value)} entries, at most {MAX_ITEMS}")
 
 
 def _violation(code: str, message: str) -> ProtocolViolation:

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.core.records import DriveRecord, PayloadRecord, Step
+from nondum.host.core.records.drive import DriveRecord
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.peers.placement.decide import (
     ELSEWHERE,

@@ -16,7 +16,7 @@ from tests.host.workers.streaming import CAMERA, STREAM, WATCH, WATCHER, sees
 from tests.kit.processes import is_alive, until_gone
 from tests.kit.workers import WorkersUnderTest
 
-from nondum.host.core.events import WorkerReady
+from nondum.host.core.events.workers import WorkerReady
 from nondum.host.jobs.children import Children
 from nondum.host.peers.streams.bridge import Bridge
 from nondum.host.peers.streams.remote_streams import RemoteStreams

@@ -7,17 +7,15 @@ from pathlib import Path
 
 import pytest
 from tests.host.lifecycle.states import component
+from tests.kit.golden import Golden
 
 from nondum.host.core.feedback_state import State, StateReason
-from nondum.host.core.records import (
-    ComponentRecord,
-    DriveRecord,
-    DriveState,
-    PayloadRecord,
-    Safety,
-    Snapshot,
-    Step,
-)
+from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.host.people.feedback.state_reasons import Known, state_reasons
 from nondum.sdk.errors import Problem
@@ -83,15 +81,12 @@ def test_a_payload_under_way_is_being_worked_on(step: Step) -> None:
     assert states(known(at(step))) == [State.WORKING]
 
 
-def test_a_refused_payload_tells_its_code_and_why() -> None:
+def test_a_refused_payload_tells_its_code_and_why(golden: Golden) -> None:
     [refused] = state_reasons(known(at(Step.REFUSED, UNSIGNED)))
     assert refused == StateReason(
-        State.REFUSED,
-        "payload k",
-        "org.example.eye is refused: the payload is not signed",
-        "SIG_MISSING",
-        "org.example.eye",
+        State.REFUSED, "payload k", refused.sentence, "SIG_MISSING", "org.example.eye"
     )
+    golden.check("a payload is refused", refused.sentence)
 
 
 def test_a_payload_that_runs_on_a_peer_is_not_refused_here() -> None:
@@ -109,19 +104,19 @@ def test_a_payload_that_could_not_be_brought_to_life_needs_help() -> None:
     assert states(known(at(Step.QUARANTINED, UNSIGNED))) == [State.HELP]
 
 
-def test_a_goal_that_cannot_be_had_needs_help() -> None:
+def test_a_goal_that_cannot_be_had_needs_help(golden: Golden) -> None:
     missing = Problem("NO_PLAN", "nothing can see\nand more")
     goal = GivenGoal("3", "follow me", "(x)", "maintain", 0, 3, GoalState.SUSPENDED, "", (missing,))
     [help] = state_reasons(Known(Snapshot("spot", 1), goals=(goal,)))
     assert (help.state, help.code) == (State.HELP, "NO_PLAN")
-    assert help.sentence == "goal 3 cannot be had now, follow me: nothing can see"
+    golden.check("a goal is suspended", help.sentence)
 
 
-def test_a_drive_that_may_be_pulled_tells_what_ends_then() -> None:
+def test_a_drive_that_may_be_pulled_tells_what_ends_then(golden: Golden) -> None:
     eye = component("eye", "k")
-    assert "eye then ends" in told(eye, PAYLOAD)
+    golden.check("a drive may be pulled", told(eye, PAYLOAD))
     two = replace(PAYLOAD, sources={**PAYLOAD.sources, "sdc1-8": Path("/mnt")})
-    assert told(eye, two) == "drive sdb1-7 may be pulled"
+    golden.check("one of two drives may be pulled", told(eye, two))
 
 
 def told(eye: ComponentRecord, payload: PayloadRecord) -> str:
@@ -130,11 +125,11 @@ def told(eye: ComponentRecord, payload: PayloadRecord) -> str:
     return safe.sentence
 
 
-def test_a_component_that_waits_for_its_device_needs_help() -> None:
+def test_a_component_that_waits_for_its_device_needs_help(golden: Golden) -> None:
     waiting = component("eye", "k", need="0403")
     [help] = state_reasons(Known(Snapshot("spot", 1, components=(waiting,))))
     assert (help.state, help.code) == (State.HELP, "DEVICE_MISSING")
-    assert help.sentence == "eye waits for its device port"
+    golden.check("a device is missing", help.sentence)
     served = replace(waiting, devices=(replace(waiting.devices[0], device="usb:1-4"),))
     assert not state_reasons(Known(Snapshot("spot", 1, components=(served,))))
 

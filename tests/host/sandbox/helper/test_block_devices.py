@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from tests.kit.golden import Golden
 
 from nondum.host.sandbox.helper.block_devices import Machine
 from nondum.host.sources.drives.disk_report import Owner, disks
@@ -80,11 +81,13 @@ def test_usb_disk_that_the_machine_boots_from_is_its_own(computer: Computer) -> 
     assert computer.owners() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 
-def test_file_system_of_several_devices_is_known_by_what_was_mounted(computer: Computer) -> None:
+def test_file_system_of_several_devices_is_known_by_what_was_mounted(
+    computer: Computer, golden: Golden
+) -> None:
     """Its number in mountinfo is no block device's."""
     with (computer.root / "proc/self/mountinfo").open("a") as mountinfo:
         mountinfo.write("23 22 0:41 /@ /var rw - btrfs /dev/sdb1 rw\n")
-    assert computer.machine.uses(OURS)["sdb1"].why == "it is mounted on /var"
+    golden.check("a disk is mounted", computer.machine.uses(OURS)["sdb1"].why)
 
 
 def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(computer: Computer) -> None:
@@ -96,20 +99,20 @@ def test_mounted_by_a_person_is_somebody_s_until_fstab_says_so_too(computer: Com
 
 
 @pytest.mark.parametrize(
-    ("file", "text", "why"),
+    ("file", "text", "use"),
     [
-        ("srv-data.mount", "[Mount]\nWhat=/dev/sdb1\nWhere=/srv/data\n", "mounts it"),
-        ("srv-data.mount.d/disk.conf", "[Mount]\nWhat = /dev/sdb1\n", "mounts it"),
-        ("dev-sdb1.swap", "[Swap]\nWhat=/dev/sdb1\n", "swaps to it"),
+        ("srv-data.mount", "[Mount]\nWhat=/dev/sdb1\nWhere=/srv/data\n", "a unit mounts a disk"),
+        ("srv-data.mount.d/disk.conf", "[Mount]\nWhat = /dev/sdb1\n", "a unit mounts a disk"),
+        ("dev-sdb1.swap", "[Swap]\nWhat=/dev/sdb1\n", "a unit swaps to a disk"),
     ],
 )
 @pytest.mark.parametrize("folder", ["vendor", "site"])
 def test_named_by_a_unit_is_the_machine_s_own_mounted_or_not(
-    computer: Computer, folder: str, file: str, text: str, why: str
+    computer: Computer, folder: str, file: str, text: str, use: str, golden: Golden
 ) -> None:
     computer.write(f"{folder}/{file}", text)
     unit = file.partition(".d/")[0]
-    assert computer.machine.uses(OURS)["sdb1"].why == f"the machine {why} ({unit})"
+    golden.check(use, computer.machine.uses(OURS)["sdb1"].why, unit=unit)
     assert computer.owners() == dict.fromkeys(("sda", "sdb", "sdb1", "sdb2"), "host")
 
 

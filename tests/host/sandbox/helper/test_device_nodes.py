@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.kit.golden import Golden
 
 from nondum.host.sandbox.helper.device_nodes import Nodes
 from nondum.sdk.errors import NondumError
@@ -232,6 +233,6 @@ def test_integrator_may_grant_what_does_not_hang_on_usb(tmp_path: Path) -> None:
     assert nodes(tmp_path, "video4linux").put("eye", "line", 81, 0).exists()
 
 
-def test_number_without_a_device_is_refused(tmp_path: Path) -> None:
+def test_number_without_a_device_is_refused(tmp_path: Path, golden: Golden) -> None:
     (tmp_path / "sys/dev/char").mkdir(parents=True)
-    assert "no such device" in refused(nodes(tmp_path), (188, 0))
+    golden.check("there is no such device", refused(nodes(tmp_path), (188, 0)))

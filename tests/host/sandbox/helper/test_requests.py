@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.limits import NAME
 from nondum.host.sandbox.helper import requests
 from nondum.host.sandbox.helper.requests import (
@@ -32,7 +33,7 @@ WORDS: dict[str, st.SearchStrategy[Any]] = {
     "device": st.from_regex(requests.DEVICE, fullmatch=True),
     "diskseq": st.none() | NUMBERS,
     "filesystem": st.from_regex(requests.FILESYSTEM, fullmatch=True),
-    "state": st.from_regex(requests.STATE, fullmatch=True),
+    "state": st.sampled_from(State),
     "use": st.sampled_from(["read", "handover"]),
     "drive": DRIVES,
     "component": st.from_regex(requests.COMPONENT, fullmatch=True),
@@ -82,6 +83,40 @@ def test_no_field_takes_another_kind_of_value(request: Request, data: st.DataObj
         value = getattr(parsed, field.name)
         assert not isinstance(value, str) or not {*"/\\\0\n"} & set(value)
         assert value not in (".", "..")
+
+
+@pytest.mark.parametrize(
+    ("request_", "packet"),
+    [
+        (
+            Mount("sdb1", None, "", "read"),
+            b'{"verb":"Mount","device":"sdb1","diskseq":null,"filesystem":"","use":"read"}',
+        ),
+        (
+            PutNode("a", "x", 1, 2, 3),
+            b'{"verb":"PutNode","component":"a","need":"x","major":1,"minor":2,"user":3}',
+        ),
+        (requests.ShowLamps(State.READY), b'{"verb":"ShowLamps","state":"ready"}'),
+        (
+            LimitCgroup("a.1", 1, 2, 3, 0.5),
+            b'{"verb":"LimitCgroup","cgroup":"a.1","memory_mb":1,"tasks":2,"cpu_weight":3,'
+            b'"processors":0.5}',
+        ),
+        (requests.EndLamps(), b'{"verb":"EndLamps"}'),
+    ],
+    ids=str,
+)
+def test_request_is_a_table_of_its_verb_and_its_fields(request_: Request, packet: bytes) -> None:
+    assert encode(request_) == packet
+    assert parse(packet) == request_
+
+
+@pytest.mark.parametrize("component", ["", "a"])
+def test_only_clearing_nodes_may_mean_all_components(component: str) -> None:
+    assert parse(encode(requests.ClearNodes(component))) == requests.ClearNodes(component)
+    body = json.loads(encode(NODE))
+    if not component:
+        assert_refused({**body, "component": component})
 
 
 MOUNT = Mount("sdb1", 1, "vfat", "read")

@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 import pytest
 from tests.kit.descriptors import descriptors_left
 from tests.kit.disk_images import make_ext4
+from tests.kit.golden import Golden
 from tests.kit.loop_devices import attached
 from tests.kit.until import until
 
@@ -392,9 +393,11 @@ def no_key() -> PressesOfDevice:
     raise requests.refused("there is none")
 
 
-def test_only_the_key_that_root_names_is_listened_to(helper: Helper) -> None:
-    with pytest.raises(NondumError, match="names no stop key"):
+def test_only_the_key_that_root_names_is_listened_to(helper: Helper, golden: Golden) -> None:
+    with pytest.raises(NondumError) as refused:
         served(lambda: helper.client.stop_key(Path("/dev/input/event0"), 1))
+    assert refused.value.code == "HELPER_REFUSED"
+    golden.check("no stop key is named", refused.value.problems[0].message)
 
 
 def test_presses_of_the_stop_key_are_told_until_it_is_gone() -> None:

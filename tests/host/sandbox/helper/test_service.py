@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 from tests.host.sandbox.helper.machines import Machine, machine
+from tests.kit.golden import Golden
 
+from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.groups import NoTree
 from nondum.host.sandbox.helper import requests, service
 from nondum.host.sandbox.helper.device_nodes import Nodes
@@ -51,10 +53,10 @@ def test_lamps_are_those_of_root_alone(stick: Machine, tmp_path: Path) -> None:
         return Lamps(tuple(names), tmp_path / "run/lamps.json", tmp_path / "leds")
 
     root = Service(SERVED, tmp_path / "mounts", stick.disks, nodes, NoTree(), lamps, no_key)
-    root.serve(requests.ShowLamps("ready"))
+    root.serve(requests.ShowLamps(State.READY))
     assert (lamp / "brightness").read_text() == "0"
     names.append("ACT")
-    root.serve(requests.ShowLamps("ready"))
+    root.serve(requests.ShowLamps(State.READY))
     assert (lamp / "brightness").read_text() == "9"
     root.serve(requests.EndLamps())
     assert (lamp / "trigger").read_text() == "mmc0"
@@ -67,8 +69,9 @@ def refused(root: Service, request: Request) -> str:
     return error.value.problems[0].message
 
 
-def test_nodes_without_a_component_are_not_made(root: Service) -> None:
-    assert refused(root, requests.PutNode("", "line", 188, 0, None)) == "a node is some component's"
+def test_nodes_without_a_component_are_not_made(root: Service, golden: Golden) -> None:
+    why = refused(root, requests.PutNode("", "line", 188, 0, None))
+    golden.check("a node of no component", why)
 
 
 def test_drives_are_mounted_once(root: Service) -> None:
@@ -77,29 +80,32 @@ def test_drives_are_mounted_once(root: Service) -> None:
     assert (root.mounts / "sdb1-7").is_dir()
 
 
-def test_so_many_drives_are_mounted_and_no_more(root: Service) -> None:
+def test_so_many_drives_are_mounted_and_no_more(root: Service, golden: Golden) -> None:
     for number in range(service.MOST_DRIVES):
         (root.mounts / str(number)).mkdir(parents=True)
-    assert refused(root, STICK) == f"{service.MOST_DRIVES} drives are mounted already"
+    golden.check("another drive", refused(root, STICK), most=service.MOST_DRIVES)
 
 
 def test_only_a_limited_number_of_cgroups_is_made(
-    root: Service, monkeypatch: pytest.MonkeyPatch
+    root: Service, monkeypatch: pytest.MonkeyPatch, golden: Golden
 ) -> None:
     monkeypatch.setattr(service, "MOST_CGROUPS", 0)
-    assert refused(root, requests.MakeCgroup("a.1")) == "there are 0 cgroups already"
+    golden.check("another cgroup", refused(root, requests.MakeCgroup("a.1")), most=0)
 
 
 @pytest.mark.parametrize("pid", [0, 1])
-def test_processes_of_the_system_are_put_into_no_cgroup(root: Service, pid: int) -> None:
-    assert refused(root, requests.FillCgroup("a.1", pid)) == "that is no process of yours"
+def test_processes_of_the_system_are_put_into_no_cgroup(
+    root: Service, pid: int, golden: Golden
+) -> None:
+    golden.check("a foreign process", refused(root, requests.FillCgroup("a.1", pid)))
 
 
-def test_processes_of_other_users_are_put_into_no_cgroup(root: Service) -> None:
+def test_processes_of_other_users_are_put_into_no_cgroup(root: Service, golden: Golden) -> None:
     somebody = subprocess.Popen(["sleep", "60"], user=SERVED - 1)
     served = subprocess.Popen(["sleep", "60"], user=SERVED)
     try:
-        assert "no process of yours" in refused(root, requests.FillCgroup("a.1", somebody.pid))
+        why = refused(root, requests.FillCgroup("a.1", somebody.pid))
+        golden.check("a foreign process", why)
         root.serve(requests.FillCgroup("a.1", served.pid))
     finally:
         for process in (somebody, served):

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from tests.kit.golden import Golden
 from tests.sandbox.guests import open_folder
 
 from nondum.host.sandbox.cgroups.groups import NoTree
@@ -107,15 +108,17 @@ def test_namespace_of_the_served_user_maps_it_and_the_users_of_workers(root: Ser
 
 
 @pytest.mark.parametrize("user", [0, STRANGER.pw_uid])
-def test_namespaces_of_other_users_are_left_alone(root: Service, user: int) -> None:
+def test_namespaces_of_other_users_are_left_alone(root: Service, user: int, golden: Golden) -> None:
     with process_of(user) as pid:
-        assert "no process of yours" in refused(lambda: root.serve(requests.MapUsers(pid)))
+        golden.check("a foreign process", refused(lambda: root.serve(requests.MapUsers(pid))))
         assert map_of(pid, "uid_map") == []
 
 
 @pytest.mark.parametrize("pid", [0, 1])
-def test_users_are_not_mapped_for_processes_of_the_system(root: Service, pid: int) -> None:
-    assert refused(lambda: root.serve(requests.MapUsers(pid))) == "that is no process of yours"
+def test_users_are_not_mapped_for_processes_of_the_system(
+    root: Service, pid: int, golden: Golden
+) -> None:
+    golden.check("a foreign process", refused(lambda: root.serve(requests.MapUsers(pid))))
 
 
 def test_process_without_a_namespace_of_its_own_gets_no_map(root: Service) -> None:
@@ -165,21 +168,23 @@ def test_what_the_worker_writes_is_the_daemons_on_the_disk(root: Service, folder
 
 
 @pytest.mark.parametrize("user", OTHERS)
-def test_users_that_are_no_workers_are_not_given(root: Service, folder: Path, user: int) -> None:
-    assert "no user of workers" in refused(lambda: mapped(root, folder, user))
+def test_users_that_are_no_workers_are_not_given(
+    root: Service, folder: Path, user: int, golden: Golden
+) -> None:
+    golden.check("a foreign user", refused(lambda: mapped(root, folder, user)), user=user)
     node = requests.PutNode("eye", "line", 188, 0, user)
-    assert "no user of workers" in refused(lambda: root.serve(node))
+    golden.check("a foreign user", refused(lambda: root.serve(node)), user=user)
 
 
-def test_folders_of_other_users_are_not_mapped(root: Service, folder: Path) -> None:
+def test_folders_of_other_users_are_not_mapped(root: Service, folder: Path, golden: Golden) -> None:
     os.chown(folder, STRANGER.pw_uid, STRANGER.pw_gid)
-    assert refused(lambda: mapped(root, folder)) == "that is no folder of yours"
+    golden.check("a foreign folder", refused(lambda: mapped(root, folder)))
 
 
-def test_other_things_are_not_mapped(root: Service, folder: Path) -> None:
+def test_other_things_are_not_mapped(root: Service, folder: Path, golden: Golden) -> None:
     (folder / "file").write_text("x")
     os.chown(folder / "file", SERVED.pw_uid, SERVED.pw_gid)
-    assert refused(lambda: mapped(root, folder / "file")) == "that is no folder of yours"
+    golden.check("a foreign folder", refused(lambda: mapped(root, folder / "file")))
 
 
 def test_mount_that_is_in_place_stays_as_it_is(root: Service, folder: Path) -> None:

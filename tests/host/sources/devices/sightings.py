@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.events import DeviceAppeared
-from nondum.host.core.records import DeviceNode, DeviceRecord
+from nondum.host.core.events.devices import DeviceAppeared
+from nondum.host.core.records.device import DeviceNode, DeviceRecord
 from nondum.host.sources.devices.hardware import Part, described
 
 BUS = "/devices/pci0000:00/0000:00:04.0/usb1"

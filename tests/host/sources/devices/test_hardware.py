@@ -16,8 +16,9 @@ from tests.host.sources.devices.sightings import (
     usb,
 )
 
-from nondum.host.core.events import DeviceAppeared, DeviceChanged, DeviceRemoved, Event
-from nondum.host.core.records import DeviceInterface, DeviceRecord
+from nondum.host.core.events.devices import DeviceAppeared, DeviceChanged, DeviceRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.device import DeviceInterface, DeviceRecord
 from nondum.host.sources.devices.hardware import Part, devices, lineage, physical, record
 from nondum.host.sources.devices.source import Sightings
 from nondum.host.sources.devices.udev import Tree

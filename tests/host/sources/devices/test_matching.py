@@ -11,8 +11,9 @@ from tests.host.sources.devices.sightings import (
     serial_adapter,
     usb,
 )
+from tests.kit.golden import Golden
 
-from nondum.host.core.records import DeviceRecord
+from nondum.host.core.records.device import DeviceRecord
 from nondum.host.sources.devices.hardware import Part, record
 from nondum.host.sources.devices.matching import left_alone, serving, tried
 
@@ -77,8 +78,8 @@ def test_nodes_that_match_are_one_group() -> None:
     assert names(CAMERA, {"usb": "046d:0825"}) == ["video0", "video1", "controlC1", "pcmC1D0c"]
 
 
-def test_keyboards_are_nobodys() -> None:
-    assert left_alone(KEYBOARD) == "it is a keyboard"
+def test_keyboards_are_nobodys(golden: Golden) -> None:
+    golden.check("a keyboard", left_alone(KEYBOARD))
     for match in ({"usb": "0627:0001"}, {"subsystem": "hidraw"}, {"subsystem": "usb"}):
         assert names(KEYBOARD, match) == []
 
@@ -123,19 +124,17 @@ def test_keyboard_hidden_in_an_instrument_is_not_given_with_it() -> None:
     assert names(both, {"subsystem": "usb"}) == []
 
 
-@pytest.mark.parametrize(
-    ("kind", "reason"), [("9/0/0", "it is a hub"), ("8/6/80", "it is a drive")]
-)
-def test_hubs_and_drives_are_nobodys(kind: str, reason: str) -> None:
+@pytest.mark.parametrize(("kind", "what"), [("9/0/0", "a hub"), ("8/6/80", "a drive")])
+def test_hubs_and_drives_are_nobodys(kind: str, what: str, golden: Golden) -> None:
     device = usb("1-1")
     thing = made([device, interface(device, 0, kind)])
-    assert left_alone(thing) == reason
+    golden.check(what, left_alone(thing))
     assert names(thing, {"subsystem": "usb"}) == []
 
 
-def test_disk_on_another_bus_is_nobodys() -> None:
+def test_disk_on_another_bus_is_nobodys(golden: Golden) -> None:
     disk = Part("/devices/pci0/0000:00:05.0", "pci", "", True, {})
-    assert left_alone(made([node(disk, "scsi_generic", "sg0")])) == "it is a drive"
+    golden.check("a drive", left_alone(made([node(disk, "scsi_generic", "sg0")])))
 
 
 def test_it_is_told_which_rule_failed_and_what_was_found() -> None:

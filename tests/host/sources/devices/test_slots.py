@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from tests.kit.clock import VirtualClock
 from tests.kit.descriptors import descriptors_left
 
-from nondum.host.core.events import DeviceAppeared, DeviceRemoved, Event
-from nondum.host.core.records import DeviceNode
+from nondum.host.core.events.devices import DeviceAppeared, DeviceRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.device import DeviceNode
 from nondum.host.sources.devices import DeviceSlotSource
 from nondum.host.sources.devices.slots import parse_slot
 from nondum.host.sources.slot_folders import AGAIN_S

@@ -7,8 +7,10 @@ import asyncio
 import pytest
 from tests.host.sources.devices.sightings import appeared, camera_with_microphone, serial_adapter
 
-from nondum.host.core.events import DeviceRemoved
-from nondum.host.core.records import DeviceRecord, FormerPayload, Snapshot
+from nondum.host.core.events.devices import DeviceRemoved
+from nondum.host.core.records.device import DeviceRecord
+from nondum.host.core.records.payload import FormerPayload
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.sources.devices.drivers import drivers_of, missed, remembered
 from nondum.host.sources.devices.hardware import record
 from nondum.host.sources.devices.software import Software

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from nondum.host.core.events import DeviceAppeared, DeviceRemoved, Event
+from nondum.host.core.events.devices import DeviceAppeared, DeviceRemoved
+from nondum.host.core.events.event import Event
 from nondum.host.sources.devices import UdevSource
 from nondum.host.sources.devices.hardware import device_id, devices, physical
 from nondum.host.sources.devices.source import Sightings

@@ -20,8 +20,9 @@ from tests.kit.loop_devices import attached, can_be_made, detach
 from tests.kit.payloads import Part, make_wheel
 from tests.kit.traces import until_unmounted
 
-from nondum.host.core import events
-from nondum.host.core.records import DriveState, Step
+from nondum.host.core.events.drives import DriveRead
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.step import Step
 from nondum.host.manager.state_folders import Folders
 from nondum.host.sandbox.helper import drive_nodes, filesystems, mounting
 from nondum.host.sandbox.helper.mountinfo import mounted_below
@@ -324,7 +325,7 @@ async def test_composite_stick_is_refused_unread(tmp_path: Path) -> None:
             await until_drive_is(host, DriveState.IDLE)
             (drive,) = host.snapshot.drives
             assert [problem.code for problem in drive.problems] == ["USB_EXTRA_INTERFACE"]
-            assert not [e for e in host.heard if isinstance(e, events.DriveRead)]
+            assert not [e for e in host.heard if isinstance(e, DriveRead)]
             assert attribute(node, "ro") == 0, "it was not touched"
 
         def allowed(folders: Folders) -> Sequence[DriveSource]:

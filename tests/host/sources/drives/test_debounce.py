@@ -9,14 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from nondum.host.core.events import (
-    DriveFlapping,
-    DriveInserted,
-    DriveRemoved,
-    DrivesScanned,
-    Emit,
-    Event,
-)
+from nondum.host.core.events.drives import DriveFlapping, DriveInserted, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Emit, Event
 from nondum.host.sources.drives import debounce
 from nondum.host.sources.drives.debounce import FREE_FLAPS, SHORT_STAY_S, Debounced
 

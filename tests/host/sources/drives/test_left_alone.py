@@ -15,13 +15,13 @@ from tests.kit.host import LAMP
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part
 
-from nondum.host.core.events import (
+from nondum.host.core.events.drives import (
     DriveInserted,
     DriveLeftAlone,
     DriveRemoved,
     DrivesScanned,
-    Event,
 )
+from nondum.host.core.events.event import Event
 from nondum.host.sandbox.helper import mounting
 from nondum.host.sandbox.helper.block_devices import Machine
 from nondum.host.sources.drives.blocks import BlockSource

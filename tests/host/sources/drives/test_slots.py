@@ -16,7 +16,8 @@ from tests.kit.clock import VirtualClock
 from tests.kit.descriptors import descriptors_left, open_descriptors
 from tests.kit.until import until_async
 
-from nondum.host.core.events import DriveInserted, DriveRemoved, DrivesScanned, Event
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Event
 from nondum.host.sources.drives.slots import SlotSource
 from nondum.host.sources.slot_folders import AGAIN_S
 from nondum.wheelhouse.store import disk

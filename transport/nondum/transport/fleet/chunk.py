@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.wire import Body, unpack
-from nondum.sdk.wire_fields import read_number
+from nondum.sdk.wire_fields import Number, read_field
 from nondum.transport.peers.messages import MAX_MESSAGE
 from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
@@ -77,7 +77,7 @@ def parse(body: Body) -> Chunk:
     changes = body["changes"]
     if type(changes) is not dict or not all(map(_is_change, changes.items())):
         raise _violation("changes are packed entries by short keys")
-    return Chunk(read_number(body["epoch"]), since, state, part, parts, changes)
+    return Chunk(read_field(Number, body["epoch"]), since, state, part, parts, changes)
 
 
 def read_state(body: Body) -> State:
@@ -85,7 +85,7 @@ def read_state(body: Body) -> State:
     digest = body.get("digest")
     if type(digest) is not bytes or len(digest) != DIGEST_BYTES:
         raise _violation(f"a digest has {DIGEST_BYTES} bytes")
-    return State(read_number(body.get("revision")), digest)
+    return State(read_field(Number, body.get("revision")), digest)
 
 
 def read_entry(packed: bytes) -> Body:

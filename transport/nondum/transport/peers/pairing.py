@@ -19,49 +19,63 @@ import hashlib
 import hmac
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
-from nondum.sdk.errors import Problem
+from nondum.sdk.codec.checks import Bounds
+from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.transport.peers.certificate import HOST_NAME
 from nondum.transport.peers.failures import PeerRefused
-from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.keys import PeerKey, parse_key
 
 WINDOW_S = 120.0
 """How long a host can be paired after a person allowed it."""
 TRIES = 3
 """How often, in that time."""
 NONCE_BYTES = 16
+HASH_BYTES = 32
 CODE_DIGITS = 6
+
+
+def _check_name(name: str) -> None:
+    if not HOST_NAME.fullmatch(name):
+        problem = Problem("HOST_NAME", "the other end's name is none of a host")
+        raise ProtocolViolation(problem)
+
+
+Key: TypeAlias = Annotated[PeerKey, parse_key]
+HostName: TypeAlias = Annotated[str, _check_name]
+Hash: TypeAlias = Annotated[bytes, Bounds(HASH_BYTES, HASH_BYTES)]
 
 
 @dataclass(frozen=True, slots=True)
 class Ask:
     """The first message: pair with me."""
 
-    key: PeerKey
-    name: str
+    key: Key
+    name: HostName
 
 
 @dataclass(frozen=True, slots=True)
 class Commit:
     """The answer: I hold a nonce of which this is the hash."""
 
-    key: PeerKey
-    name: str
-    commitment: bytes
+    key: Key
+    name: HostName
+    commitment: Hash
 
 
 @dataclass(frozen=True, slots=True)
 class Nonce:
     """A nonce, told."""
 
-    nonce: bytes
+    nonce: Annotated[bytes, Bounds(NONCE_BYTES, NONCE_BYTES)]
 
 
 @dataclass(frozen=True, slots=True)
 class Agreed:
     """The person here saw the same code there."""
 
-    proof: bytes
+    proof: Hash
 
 
 Message: TypeAlias = Ask | Commit | Nonce | Agreed

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
+from nondum.sdk.codec.checks import Bounds
+from nondum.sdk.wire_fields import Number
 from nondum.transport.peers.keys import PeerKey
 
 DIGEST_BYTES = 8
@@ -14,10 +17,10 @@ DIGEST_BYTES = 8
 class State:
     """Of what a host tells its peers about itself: enough to see whether anything was missed."""
 
-    revision: int
+    revision: Number
     """Counts up from 1 in one life of the host."""
-    digest: bytes
-    """Over all of it, `DIGEST_BYTES` long."""
+    digest: Annotated[bytes, Bounds(DIGEST_BYTES, DIGEST_BYTES)]
+    """Over all of it."""
 
 
 def _nothing() -> None:

@@ -21,8 +21,8 @@ from typing import Any, TypeAlias
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.messages import Buffer
-from nondum.sdk.wire import pack, unpack
-from nondum.sdk.wire_fields import read_body, read_number, read_problem, read_text
+from nondum.sdk.wire import Body, pack, unpack
+from nondum.sdk.wire_fields import Name, Number, read_field, read_problem
 
 VERSION = 1
 MAX_ASKED = 1024
@@ -119,9 +119,9 @@ def read_asked(data: bytes) -> Asked:
     """Read a reader's message. Raises `ProtocolViolation`."""
     match unpack(data, MAX_ASKED):
         case [1, int(version), token]:
-            return Claim(read_number(version), read_text(token))
+            return Claim(read_field(Number, version), read_field(Name, token))
         case [2, seq]:
-            return Handled(read_number(seq))
+            return Handled(read_field(Number, seq))
         case [3, at_s]:
             return Ping(_clock(at_s))
     raise _violation("no message of a reader")
@@ -154,9 +154,9 @@ def read_told(parts: Sequence[Buffer]) -> Told:
     fields = unpack(bytes(parts[0]))
     match fields:
         case [2, seq, 0 | 1 as coding, header] if type(coding) is int:
-            return Frame(read_number(seq), Coding(coding), read_body(header), bulk)
+            return Frame(read_field(Number, seq), Coding(coding), read_field(Body, header), bulk)
         case [1, kind] if bulk is None:
-            return Opened(read_text(kind))
+            return Opened(read_field(Name, kind))
         case [3, at_s, clock_s] if bulk is None:
             return Pong(_clock(at_s), _clock(clock_s))
         case [4, problem] if bulk is None:

@@ -38,6 +38,7 @@ MAX_FILES = 512
 MAX_FILE_BYTES = 8 * 1024**3
 MAX_RELEASE = 2**53
 FORMAT = "nondum-payload 1"
+_ANY_FORMAT = FORMAT.partition(" ")[0].encode() + b" "
 HEADER_KEYS = ("id", "version", "release", "fleet", "hosts", "minimum-nondum", "built")
 """In the order in which they stand."""
 OPTIONAL_KEYS = ("hosts",)
@@ -102,6 +103,18 @@ class Contents:
     def total_bytes(self) -> int:
         """Size of all files together."""
         return sum(entry.size for entry in self.entries)
+
+
+def begins_wrong(data: bytes, where: str) -> Problem | None:
+    """Why bytes are no contents list of any version, by their first ones; None: they may be one.
+
+    For a list that no key vouches for, which must not be parsed: nothing of it is told.
+    """
+    if data.startswith(_ANY_FORMAT):
+        return None
+    if not data.isascii():
+        return _flaw("CONTENTS_ENCODING", "is not a contents list", where)
+    return _flaw("SCHEMA_VERSION", "is not a contents list", where)
 
 
 def parse(data: bytes, where: str) -> Contents:

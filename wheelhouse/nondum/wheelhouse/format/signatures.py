@@ -7,9 +7,10 @@ bytes of the signature file.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol, cast
 
+from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.format import goals as goal_file
 from nondum.wheelhouse.format.manifest import GOALS, GRANTABLE, Manifest
@@ -32,13 +33,12 @@ class Grant:
 
     def to_dict(self) -> dict[str, Any]:
         """The grant as plain data."""
-        return asdict(self)
+        return cast(dict[str, Any], to_plain(self))
 
     @classmethod
     def parse(cls, said: Mapping[str, Any]) -> Grant:
         """Read what `to_dict` gave, from our own child."""
-        permissions, owners = tuple(said["permissions"]), tuple(said["owners"])
-        return cls(permissions, said["role"], owners, said["most_release"])
+        return from_plain(cls, said)
 
     def problems(self, manifest: Manifest, goals: Sequence[str] = ()) -> tuple[Problem, ...]:
         """What a payload asks for and is not granted (PERMISSION_DENIED)."""

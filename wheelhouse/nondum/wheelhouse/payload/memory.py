@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from nondum.sdk.codec.values import from_plain
 from nondum.sdk.errors import Problem
 from nondum.wheelhouse.format.manifest import Requires
 from nondum.wheelhouse.payload import gpu
@@ -36,8 +37,7 @@ class Promised:
     @classmethod
     def parse(cls, said: Mapping[str, Any]) -> Promised:
         """Read what a daemon tells its children."""
-        holders, gpu_holders = tuple(said["holders"]), tuple(said["gpu_holders"])
-        return cls(**{**said, "holders": holders, "gpu_holders": gpu_holders})
+        return from_plain(cls, said)
 
 
 @dataclass(frozen=True, slots=True)

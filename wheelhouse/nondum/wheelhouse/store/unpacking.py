@@ -93,8 +93,8 @@ def _unpacked(
         for source, view, layout in zip(sources, views, layouts, strict=True)
         for file in layout.files
     ]
-    planned.sort(key=lambda one: -one[0].member.size)
-    counter.begin(sum(file.member.size for file, _, _ in planned))
+    planned.sort(key=lambda one: -one[0].size)
+    counter.begin(sum(file.size for file, _, _ in planned))
     written = [(one[1], pool.submit(_write, *one, counter)) for one in planned]
     for source, digest in zip(sources, hashes, strict=True):
         if digest.result() != source.sha256:
@@ -161,19 +161,20 @@ def _write(
     file: PlannedFile, source: Source, data: Bytes, counter: _Counter
 ) -> StoredFile | Problem:
     digest = hashlib.sha256()
+    pieces = archive.unpack(data, file.member) if file.contents is None else (file.contents,)
     try:
         # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
         with open(f"{source.root}/{file.target}", "xb") as out:  # noqa: PTH123  # many files
-            for piece in archive.unpack(data, file.member):
+            for piece in pieces:
                 digest.update(piece)
                 out.write(piece)
                 counter.add(len(piece))
             out.flush()
             os.fchmod(out.fileno(), 0o555 if file.member.is_executable else 0o444)
-            if file.member.size >= _WRITE_SOON:
+            if file.size >= _WRITE_SOON:
                 _libc.sync_file_range(out.fileno(), 0, 0, _SYNC_FILE_RANGE_WRITE)
     except ValueError as error:
         return wheel.damaged(file, source.path.name, str(error))
     if file.sha256 and digest.hexdigest() != file.sha256:
         return wheel.damaged(file, source.path.name, "it is not what RECORD says")
-    return StoredFile(file.target, file.member.size, digest.hexdigest())
+    return StoredFile(file.target, file.size, digest.hexdigest())

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.format.lock import LockedWheel
+from nondum.wheelhouse.store import pip_target
 from nondum.wheelhouse.store.stored import StoredWheel
 
 PIP_TIMEOUT_S = 600
@@ -93,6 +94,7 @@ def make_with_pip(
         shutil.rmtree(unfinished, ignore_errors=True)
         raise InstallFailed(Problem("PIP_FAILED", failure, where=str(folder)))
     requirements.unlink()
+    pip_target.trim(site_packages(unfinished))
     unfinished.rename(venv)
 
 

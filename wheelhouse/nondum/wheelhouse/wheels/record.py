@@ -65,6 +65,29 @@ def flaws(members: Sequence[Member], record: Record, info: str) -> Iterator[str]
         yield f"RECORD lists {path[:80]!r}, which is not there"
 
 
+def as_installed(record: Record, places: Mapping[str, str]) -> str:
+    """RECORD of what was installed: `places` says where each member of the wheel went; members that
+    are not in it were left out.
+
+    >>> rows = {"a-1.data/purelib/a.py": Row("00" * 32, 1), "a-1.data/scripts/a": Row("ff" * 32, 2)}
+    >>> as_installed(rows, {"a-1.data/purelib/a.py": "a.py"}).splitlines()
+    ['a.py,sha256=AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA,1']
+    """
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    for path, row in record.items():
+        if path in places:
+            rows.writerow((places[path], _digest(row.sha256), "" if row.size is None else row.size))
+    return text.getvalue()
+
+
+def _digest(sha256: str) -> str:
+    """A hex digest as RECORD has it; empty when there is none."""
+    if not sha256:
+        return ""
+    return f"sha256={base64.urlsafe_b64encode(bytes.fromhex(sha256)).decode().rstrip('=')}"
+
+
 def _hex(digest: str) -> str:
     """RECORD's `sha256=<urlsafe base64>` as hex; empty when it gives none."""
     if not digest:

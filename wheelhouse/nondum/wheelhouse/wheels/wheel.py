@@ -12,7 +12,7 @@ import hashlib
 import sys
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from nondum.sdk.errors import PayloadRefused, Problem
@@ -20,6 +20,7 @@ from nondum.wheelhouse.format.fixed_file import Bytes, FixedFile
 from nondum.wheelhouse.wheels import archive, dist_info, extensions, record
 from nondum.wheelhouse.wheels.archive import Member
 from nondum.wheelhouse.wheels.dist_info import Needs, WheelName
+from nondum.wheelhouse.wheels.record import Record
 
 SDK = "nondum-sdk"
 HARMLESS_HOOKS = frozenset({"distutils-precedence.pth", "a1_coverage.pth"})
@@ -39,6 +40,13 @@ class PlannedFile:
     member: Member
     sha256: str
     """Hex digest that RECORD gives; empty for the few files that it gives none for."""
+    contents: bytes | None = None
+    """What is written instead of the member's bytes, if RECORD has to name other files."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file that is written."""
+        return self.member.size if self.contents is None else len(self.contents)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +95,7 @@ def lay_out(data: Bytes, filename: str) -> Layout:
     files, left_out = [], []
     for member in found.members:
         target = _target(member.path)
-        if target is None or _is_hook(target):
+        if target is None or is_hook(target):
             left_out.append(member.path)
         else:
             row = listed.get(member.path)
@@ -95,7 +103,22 @@ def lay_out(data: Bytes, filename: str) -> Layout:
     problems.extend(_target_problems(files, filename))
     placed = [(file.target, file.member) for file in files]
     problems.extend(extensions.problems(data, placed, named, filename))
-    return Layout(tuple(files), tuple(left_out), tuple(problems), needs)
+    planned = _with_record(files, listed, f"{info}/RECORD")
+    return Layout(planned, tuple(left_out), tuple(problems), needs)
+
+
+def _with_record(
+    files: Sequence[PlannedFile], listed: Record, record_path: str
+) -> tuple[PlannedFile, ...]:
+    """The files, with a RECORD that names these and no others: pip and `importlib.metadata` read
+    what it says."""
+    places = {file.member.path: file.target for file in files}
+    if all(places.get(path) == path for path in listed):
+        return tuple(files)
+    told = record.as_installed(listed, places).encode()
+    return tuple(
+        replace(file, contents=told) if file.member.path == record_path else file for file in files
+    )
 
 
 def hook_problems(
@@ -106,7 +129,7 @@ def hook_problems(
     None is ever installed, since workers run no hooks; but a wheel that counts on one would not
     work, and an unexpected one is most often an attack.
     """
-    hooks = [target for path in left_out if _is_hook(target := _target(path) or "")]
+    hooks = [target for path in left_out if is_hook(target := _target(path) or "")]
     return tuple(
         Problem(
             "WHEEL_STARTUP_HOOK",
@@ -241,8 +264,8 @@ def _target_problems(files: Sequence[PlannedFile], filename: str) -> Iterator[Pr
             yield Problem("WHEEL_PATH", text, where=filename)
 
 
-def _is_hook(target: str) -> bool:
-    """Whether `site` would act by a file (PEP 829 adds `.start` to `.pth`)."""
+def is_hook(target: str) -> bool:
+    """Whether `site` would act by a file of site-packages (PEP 829 adds `.start` to `.pth`)."""
     return "/" not in target and target.endswith((".pth", ".start"))
 
 

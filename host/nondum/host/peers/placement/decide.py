@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from nondum.host.core.records import DriveRecord, PayloadRecord, Step
+from nondum.host.core.records.drive import DriveRecord
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.sdk.errors import Problem
 from nondum.transport.peers import PeerKey

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.news import Progress
-from nondum.host.core.events import Emit, RetryAsked
+from nondum.host.core.events.event import Emit
+from nondum.host.core.events.payloads import RetryAsked
 from nondum.host.core.plain import Row
-from nondum.host.core.records import PayloadRecord, Step
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.unknown import unknown
 from nondum.host.peers.placement.case import Case
 from nondum.host.peers.placement.decide import ELSEWHERE, movable_source

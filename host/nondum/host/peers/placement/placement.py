@@ -9,7 +9,7 @@ from typing import Any
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.host_config import HostConfig
 from nondum.host.control.arguments import Arguments
-from nondum.host.core.events import Emit, Event
+from nondum.host.core.events.event import Emit, Event
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.dispatch import Dispatcher

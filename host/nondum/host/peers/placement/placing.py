@@ -13,17 +13,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from nondum.host.core.events import (
-    Emit,
-    Event,
-    HostStarted,
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.placement import (
     PayloadPlaced,
     PayloadSentAway,
     PlaceLost,
     PlaceMissing,
 )
 from nondum.host.core.printable import printable
-from nondum.host.core.records import Step
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders

@@ -13,17 +13,15 @@ from functools import partial
 from typing import Any, NoReturn
 
 from nondum.host.core.clock import now
-from nondum.host.core.events import (
-    DriveInserted,
-    DriveRemoved,
-    Emit,
-    Event,
-    HostStarted,
-    PayloadFound,
-    PayloadTaken,
-)
+from nondum.host.core.events.daemon import HostStarted
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved
+from nondum.host.core.events.event import Emit, Event
+from nondum.host.core.events.payloads import PayloadFound
+from nondum.host.core.events.placement import PayloadTaken
 from nondum.host.core.keyed_queues import in_thread
-from nondum.host.core.records import DriveState, PayloadRecord, Step
+from nondum.host.core.records.drive import DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.jobs.children import Children
 from nondum.host.lifecycle import admission

@@ -9,17 +9,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from nondum.host.core.events import (
-    CatalogueUnwritten,
-    CatalogueWritten,
-    DriveRead,
-    DriveReleased,
-    DriveRemoved,
-    DriveUnreadable,
-    Event,
-)
+from nondum.host.core.events.catalogue import CatalogueUnwritten, CatalogueWritten
+from nondum.host.core.events.drives import DriveRead, DriveReleased, DriveRemoved, DriveUnreadable
+from nondum.host.core.events.event import Event
 from nondum.host.core.feedback_state import NOTHING, State, StateReason
-from nondum.host.core.records import Snapshot
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.extension.hookspecs import Output
 from nondum.host.mind.goals import GivenGoal
 from nondum.host.people.feedback import showing

@@ -6,16 +6,12 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from nondum.host.core.feedback_state import State, StateReason
-from nondum.host.core.records import (
-    INSTALLED,
-    ComponentState,
-    DriveRecord,
-    DriveState,
-    PayloadRecord,
-    Safety,
-    Snapshot,
-    Step,
-)
+from nondum.host.core.records.component import ComponentState
+from nondum.host.core.records.drive import INSTALLED, DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.safety import Safety
+from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.records.step import Step
 from nondum.host.core.status import is_at_rest, waits_for_devices
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.sdk.errors import Problem

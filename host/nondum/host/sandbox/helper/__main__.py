@@ -12,7 +12,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from nondum.host.config.host_config import SYSTEM_FILE, HostConfig, load
+from nondum.host.config.host_config import SYSTEM_FILE, HostConfig
+from nondum.host.config.parsing import load
 from nondum.host.config.stop_keys import code_of
 from nondum.host.config.stop_section import StopSection
 from nondum.host.sandbox.cgroups import hierarchies

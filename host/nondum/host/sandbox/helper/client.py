@@ -86,7 +86,7 @@ class HelperClient:
 
     def show_lamps(self, names: tuple[str, ...], state: State, kept: Path) -> None:
         """Have lamps show a state: those that the helper's own configuration names."""
-        self._ask(requests.ShowLamps(state.value))
+        self._ask(requests.ShowLamps(state))
 
     def end_lamps(self, names: tuple[str, ...], kept: Path) -> None:
         """Have them show what they showed before."""

@@ -10,12 +10,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, TypeAlias, get_args, get_type_hints
+from dataclasses import dataclass
+from typing import Annotated, TypeAlias, get_args
 
 from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.limits import NAME as CGROUP_NAME
 from nondum.host.sandbox.cgroups.limits import CgroupLimits
+from nondum.sdk.codec.checks import Bounds, matching
+from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import NondumError, Problem
 
 MAX_BYTES = 1024
@@ -24,34 +26,42 @@ ANSWER_BYTES = 64 * 1024
 
 DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
 DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
-USE = re.compile("read|handover")
 COMPONENT = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
 NEED = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}(\.[A-Za-z0-9][A-Za-z0-9_-]{0,62})?")
 FILESYSTEM = re.compile(r"[a-z0-9]{0,16}")
-STATE = re.compile("|".join(state.value for state in State))
+
+Device: TypeAlias = Annotated[str, matching(DEVICE)]
+Drive: TypeAlias = Annotated[str, matching(DRIVE)]
+Use: TypeAlias = Annotated[str, matching(re.compile("read|handover"))]
+"""Reading by this host, or handing over to another: a drive may be mounted once for each."""
+Component: TypeAlias = Annotated[str, matching(COMPONENT)]
+Need: TypeAlias = Annotated[str, matching(NEED)]
+Cgroup: TypeAlias = Annotated[str, matching(CGROUP_NAME)]
+Number: TypeAlias = Annotated[int, Bounds(0, 2**63 - 1)]
+Pid: TypeAlias = Annotated[int, Bounds(0, 2**31 - 1)]
+"""Above it the kernel's calls do not take them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mount:
     """Mount a drive for reading; the answer is where."""
 
-    device: str
+    device: Device
     """Kernel name: `sdb1`."""
-    diskseq: int | None
+    diskseq: Number | None
     """Insertion number; None: the kernel counts none."""
-    filesystem: str
+    filesystem: Annotated[str, matching(FILESYSTEM)]
     """Empty: as the drive says."""
-    use: str
-    """`read` by this host, or `handover` to another: a drive may be mounted once for each."""
+    use: Use
 
 
 @dataclass(frozen=True, slots=True)
 class Unmount:
     """Unmount a drive."""
 
-    drive: str
+    drive: Drive
     """Kernel name and insertion number: `sdb1-42`."""
-    use: str
+    use: Use
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +73,11 @@ class UnmountAll:
 class PutNode:
     """Make a node of a character device in a component's folder; the answer is where."""
 
-    component: str
-    need: str
-    major: int
-    minor: int
-    user: int | None
+    component: Component
+    need: Need
+    major: Number
+    minor: Number
+    user: Number | None
     """Whose it is: a worker's; None: the daemon's."""
 
 
@@ -75,29 +85,29 @@ class PutNode:
 class TakeNode:
     """Remove a node."""
 
-    component: str
-    need: str
+    component: Component
+    need: Need
 
 
 @dataclass(frozen=True, slots=True)
 class ClearNodes:
     """Remove all nodes of a component; empty: of all."""
 
-    component: str
+    component: Annotated[str, matching(re.compile(f"({COMPONENT.pattern})?"))]
 
 
 @dataclass(frozen=True, slots=True)
 class MapUsers:
     """Have a user namespace that a process of the daemon's has made know the users of workers."""
 
-    pid: int
+    pid: Pid
 
 
 @dataclass(frozen=True, slots=True)
 class MapFolder:
     """Have a mount, which comes as a descriptor, show the daemon's files as those of a worker."""
 
-    user: int
+    user: Number
     """The worker's."""
 
 
@@ -105,8 +115,7 @@ class MapFolder:
 class ShowLamps:
     """Have the lamps that root's configuration names show a state."""
 
-    state: str
-    """`State` by its value."""
+    state: State
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,25 +132,25 @@ class ListCgroups:
 class ReadCgroup:
     """What a cgroup uses, and the processes in it."""
 
-    cgroup: str
+    cgroup: Cgroup
 
 
 @dataclass(frozen=True, slots=True)
 class MakeCgroup:
     """Make a cgroup without limits."""
 
-    cgroup: str
+    cgroup: Cgroup
 
 
 @dataclass(frozen=True, slots=True)
 class LimitCgroup:
     """Set a cgroup's limits."""
 
-    cgroup: str
-    memory_mb: int
-    tasks: int
-    cpu_weight: int
-    processors: float
+    cgroup: Cgroup
+    memory_mb: Number
+    tasks: Number
+    cpu_weight: Number
+    processors: Annotated[float, Bounds(0, 2**63)]
 
     @property
     def limits(self) -> CgroupLimits:
@@ -153,22 +162,22 @@ class LimitCgroup:
 class FillCgroup:
     """Put a process of the caller's own user into a cgroup."""
 
-    cgroup: str
-    pid: int
+    cgroup: Cgroup
+    pid: Pid
 
 
 @dataclass(frozen=True, slots=True)
 class KillCgroup:
     """SIGKILL all that is in a cgroup."""
 
-    cgroup: str
+    cgroup: Cgroup
 
 
 @dataclass(frozen=True, slots=True)
 class RemoveCgroup:
     """Remove an empty cgroup; the answer is whether it is gone."""
 
-    cgroup: str
+    cgroup: Cgroup
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,20 +210,7 @@ Request: TypeAlias = (
     | ListenToStopKey
 )
 
-_VERBS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in get_args(Request)}
-_FORMS = {
-    "device": DEVICE,
-    "drive": DRIVE,
-    "use": USE,
-    "component": COMPONENT,
-    "need": NEED,
-    "filesystem": FILESYSTEM,
-    "cgroup": CGROUP_NAME,
-    "state": STATE,
-}
-_MOST = 2**63 - 1
-_MOST_OF: Mapping[str, int] = {"pid": 2**31 - 1}
-"""Above it the kernel's calls do not take them."""
+_VERBS: Mapping[str, type[Request]] = {kind.__name__: kind for kind in get_args(Request)}
 
 
 def encode(request: Request) -> bytes:
@@ -223,7 +219,7 @@ def encode(request: Request) -> bytes:
     >>> encode(Unmount("sdb1-7", "read"))
     b'{"verb":"Unmount","drive":"sdb1-7","use":"read"}'
     """
-    body = {"verb": type(request).__name__, **asdict(request)}
+    body = {"verb": type(request).__name__, **to_plain(request)}
     return json.dumps(body, separators=(",", ":")).encode()
 
 
@@ -240,15 +236,12 @@ def parse(data: bytes) -> Request:
     kind = _VERBS.get(body.pop("verb"))
     if kind is None:
         raise refused("there is no such verb")
-    hints = get_type_hints(kind)
-    if body.keys() != hints.keys():
-        raise refused(f"{kind.__name__} takes {', '.join(hints) or 'nothing'}")
-    request: Request = kind(**{name: _typed(name, hints[name], body[name]) for name in hints})
-    if isinstance(request, LimitCgroup):
-        try:
+    try:
+        request = from_plain(kind, body, kind.__name__)
+        if isinstance(request, LimitCgroup):
             _ = request.limits
-        except ValueError as error:
-            raise refused(str(error)) from None
+    except ValueError as error:
+        raise refused(str(error)) from None
     return request
 
 
@@ -256,18 +249,3 @@ def refused(message: str, where: str = "") -> NondumError:
     """What the helper answers when it will not."""
     fix = "this is for nondum's own daemon: report it, if that was the one who asked"
     return NondumError(Problem("HELPER_REFUSED", message, where=where, fix=fix))
-
-
-def _typed(name: str, hint: Any, value: Any) -> Any:
-    if hint is str:
-        form = _FORMS[name]
-        is_none = name == "component" and value == ""
-        if not isinstance(value, str) or not (is_none or form.fullmatch(value)):
-            raise refused(f"that is no {name}")
-        return value
-    if value is None and hint == (int | None):
-        return None
-    kinds = (int, float) if hint is float else (int,)
-    if type(value) not in kinds or not 0 <= value <= _MOST_OF.get(name, _MOST):
-        raise refused(f"{name} is no number")
-    return float(value) if hint is float else value

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.limits import Tree
 from nondum.host.sandbox.helper import mounting, requests, worker_users
 from nondum.host.sandbox.helper.device_nodes import Nodes
@@ -70,7 +69,7 @@ class Service:
             case requests.MapFolder(user):
                 self._map_folder(descriptor, user)
             case requests.ShowLamps(state):
-                self.lamps().show(State(state))
+                self.lamps().show(state)
             case requests.EndLamps():
                 self.lamps().end()
             case _:

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from nondum.host.core.records import DeviceRecord, Snapshot
+from nondum.host.core.records.device import DeviceRecord
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.diagnosis import moment
 from nondum.host.sources.devices.matching import left_alone, serving
 from nondum.sdk.description import PluginDescription

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from nondum.host.core.records import DeviceInterface, DeviceNode, DeviceRecord
+from nondum.host.core.records.device import DeviceInterface, DeviceNode, DeviceRecord
 
 RAW = "usb"
 """Subsystem of the node by which a USB device is used without a driver of the kernel."""

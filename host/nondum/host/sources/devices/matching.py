@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from nondum.host.core.records import DeviceNode, DeviceRecord
+from nondum.host.core.records.device import DeviceNode, DeviceRecord
 from nondum.host.sources.devices.hardware import RAW
 from nondum.wheelhouse.format.device_rules import NAMING_NODES, Verdict, judged, names_id
 

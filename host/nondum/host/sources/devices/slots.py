@@ -20,8 +20,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core.events import Emit
-from nondum.host.core.records import DeviceNode, DeviceRecord
+from nondum.host.core.events.event import Emit
+from nondum.host.core.records.device import DeviceNode, DeviceRecord
 from nondum.host.sources.devices.hardware import described
 from nondum.host.sources.devices.source import Sightings
 from nondum.host.sources.inotify import folders_watched

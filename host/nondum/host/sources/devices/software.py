@@ -9,8 +9,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable
 
-from nondum.host.core.events import DeviceAppeared, DeviceRemoved, Event
-from nondum.host.core.records import DeviceRecord, Snapshot
+from nondum.host.core.events.devices import DeviceAppeared, DeviceRemoved
+from nondum.host.core.events.event import Event
+from nondum.host.core.records.device import DeviceRecord
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.status import is_at_rest
 from nondum.host.sources.devices.drivers import missed, remembered
 from nondum.host.sources.devices.view import claims_by_device

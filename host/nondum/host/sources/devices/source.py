@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from nondum.host.core.events import DeviceAppeared, DeviceChanged, DeviceRemoved, Emit
-from nondum.host.core.records import DeviceRecord
+from nondum.host.core.events.devices import DeviceAppeared, DeviceChanged, DeviceRemoved
+from nondum.host.core.events.event import Emit
+from nondum.host.core.records.device import DeviceRecord
 
 
 class DeviceSource(Protocol):

@@ -14,7 +14,7 @@ from typing import Any
 
 import pyudev
 
-from nondum.host.core.events import Emit
+from nondum.host.core.events.event import Emit
 from nondum.host.sources.devices.hardware import (
     Part,
     device_id,

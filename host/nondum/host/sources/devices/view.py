@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from nondum.host.core.plain import plain
-from nondum.host.core.records import (
+from nondum.host.core.records.device import (
     DeviceClaim,
     DeviceInterface,
     DeviceNode,
     DeviceRecord,
     KnownDevice,
-    Snapshot,
 )
+from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.sources.devices.matching import Trial, left_alone, tried
+from nondum.sdk.codec.values import to_plain
 
 Row: TypeAlias = dict[str, Any]
 Held: TypeAlias = Sequence[tuple[str, DeviceClaim]]
@@ -31,7 +31,7 @@ def rows_of(snapshot: Snapshot) -> list[Row]:
 
 def device_row(device: DeviceRecord, held: Held) -> Row:
     """A device that is plugged in, and who has it. All that the catalogue has of it is in it."""
-    told: Row = plain(device)
+    told: Row = to_plain(device)
     first = device.nodes[0]
     contested = sorted({other for _, claim in held for other in claim.contested_by})
     return {
@@ -44,7 +44,7 @@ def device_row(device: DeviceRecord, held: Held) -> Row:
         "need": ", ".join(claim.name for _, claim in held),
         "contested_by": contested,
         "used_by": [
-            {"component": component, "need": claim.name, "nodes": plain(claim.nodes)}
+            {"component": component, "need": claim.name, "nodes": to_plain(claim.nodes)}
             for component, claim in held
         ],
         "left_alone": left_alone(device),
@@ -63,7 +63,7 @@ def device_of(row: Mapping[str, Any]) -> DeviceRecord:
 
 def known_row(known: KnownDevice) -> Row:
     """A device that was here."""
-    told: Row = plain(known)
+    told: Row = to_plain(known)
     return told
 
 
@@ -113,5 +113,5 @@ def _trial_row(trial: Trial) -> Row:
         "node": str(trial.node.node),
         "serves": trial.serves,
         "kept_back": trial.kept_back,
-        "rules": [plain(verdict) for verdict in trial.verdicts],
+        "rules": [to_plain(verdict) for verdict in trial.verdicts],
     }

@@ -7,7 +7,13 @@ from pathlib import Path
 
 import pyudev
 
-from nondum.host.core.events import DriveInserted, DriveLeftAlone, DriveRemoved, DrivesScanned, Emit
+from nondum.host.core.events.drives import (
+    DriveInserted,
+    DriveLeftAlone,
+    DriveRemoved,
+    DrivesScanned,
+)
+from nondum.host.core.events.event import Emit
 from nondum.host.sandbox.helper.block_devices import Machine
 from nondum.host.sandbox.helper.drive_nodes import drive_name, mounted_elsewhere
 from nondum.host.sandbox.helper.mounting import unsupported

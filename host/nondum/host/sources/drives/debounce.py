@@ -11,7 +11,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nondum.host.core.events import DriveFlapping, DriveInserted, DriveRemoved, Emit, Event
+from nondum.host.core.events.drives import DriveFlapping, DriveInserted, DriveRemoved
+from nondum.host.core.events.event import Emit, Event
 from nondum.host.sources.drives.source import DriveSource
 from nondum.sdk.errors import Problem
 

@@ -14,7 +14,8 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from nondum.host.core.events import DriveInserted, DriveRemoved, DrivesScanned, Emit
+from nondum.host.core.events.drives import DriveInserted, DriveRemoved, DrivesScanned
+from nondum.host.core.events.event import Emit
 from nondum.host.sources.drives.rebuilt import RebuiltFolders
 from nondum.host.sources.inotify import folders_watched
 from nondum.host.sources.slot_folders import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from nondum.host.core.events import Emit
+from nondum.host.core.events.event import Emit
 
 
 class DriveSource(Protocol):

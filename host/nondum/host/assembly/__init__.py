@@ -1,0 +1,1 @@
+"""Makes the parts of a running host and ties them together, one module a part; see `app.py`."""

@@ -1,0 +1,26 @@
+"""What every part of a host may be made with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.config.host_config import HostConfig
+from nondum.host.core.bus import Bus
+from nondum.host.extension.loading import Extensions
+from nondum.host.manager.crash_loop import CrashCounter
+from nondum.host.manager.state_folders import Folders
+from nondum.host.service.service import Service
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """What is there before any part: configuration, state, bus, extensions, service manager."""
+
+    config: HostConfig
+    folders: Folders
+    catalogue: Catalogue
+    bus: Bus
+    extensions: Extensions
+    service: Service
+    counter: CrashCounter

@@ -1,0 +1,26 @@
+"""Optional inputs are given a stream."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nondum.host.core.events.event import Event
+from nondum.sdk.errors import Problem
+
+
+@dataclass(frozen=True, slots=True)
+class InputAmbiguous(Event):
+    """Several streams fit an optional input, and the configuration does not say which it gets."""
+
+    component: str
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class InputConnected(Event):
+    """A person said which stream an optional input is to get."""
+
+    input: str
+    """`component.unit.slot`"""
+    stream: str
+    """Empty: the host picks again."""

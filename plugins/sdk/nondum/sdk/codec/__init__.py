@@ -1,0 +1,1 @@
+"""The one codec: typed values to plain data and back, whatever carries them."""
