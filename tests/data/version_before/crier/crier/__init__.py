@@ -1,0 +1,1 @@
+"""A plugin of the version before: a stream, a behaviour, a fact, a phrase and a setting."""
