@@ -12,7 +12,8 @@ from tests.lab.lab import Lab
 CHECKOUT = Path(__file__).parents[3]
 PARTS = (
     *("tests/sandbox/baits.py", "tests/sandbox/escape.py", "tests/sandbox/table.py"),
-    *("tests/kit/until.py", "tests/kit/workers.py", "demo/robot.py", "plugins/sdk/nondum"),
+    *("tests/kit/clock.py", "tests/kit/processes.py", "tests/kit/until.py", "tests/kit/workers.py"),
+    *("demo/robot.py", "plugins/sdk/nondum"),
 )
 PLACE = "/var/lib/checkout"
 PROGRAM = """
