@@ -197,9 +197,9 @@ def test_failure_names_each_of_its_problems() -> None:
 
 
 def test_version_that_both_speak_is_agreed_on_or_none() -> None:
-    assert agreed_version(Hello((99, 1), "rover", "key", 1, 1, b"")) == 1
+    assert agreed_version(Hello((99, 1), "rover", "key", 1, 1, b""), "base") == 1
     with pytest.raises(ProtocolViolation, match="PROTO_VERSION"):
-        agreed_version(Hello((99,), "rover", "key", 1, 1, b""))
+        agreed_version(Hello((99,), "rover", "key", 1, 1, b""), "base")
 
 
 @given(messages, st.data())

@@ -85,7 +85,7 @@ class Gate:
         Raises `TurnedAway`.
         """
         try:
-            agreed_version(hello)
+            agreed_version(hello, self.identity.name)
         except NondumError as error:
             raise TurnedAway(Reason.VERSION, error.problems[0]) from error
         key = PeerKey(hello.key)

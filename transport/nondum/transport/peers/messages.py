@@ -188,24 +188,25 @@ def decode(data: bytes | memoryview) -> Message:
     return _PACKETS.message(unpack(data, MAX_MESSAGE))
 
 
-def agreed_version(hello: Hello) -> int:
-    """The newest version that both ends speak.
+def agreed_version(hello: Hello, here: str) -> int:
+    """The newest version that both ends speak; `here` is this host's name.
 
-    >>> agreed_version(Hello((3, 2, 1), "rover", "", 1, 1, b""))
+    >>> agreed_version(Hello((3, 2, 1), "rover", "", 1, 1, b""), "base")
     2
 
-    Raises `ProtocolViolation` (PROTO_VERSION).
+    Raises `ProtocolViolation` (PROTO_VERSION), which says which of the two is older.
     """
     common = set(hello.versions) & set(VERSIONS)
     if not common:
+        older = hello.name if max(hello.versions) < max(VERSIONS) else here
         raise ProtocolViolation(
             Problem(
                 "PROTO_VERSION",
-                "the peer speaks no version of the protocol that this host speaks",
+                f"{hello.name} speaks no version of the protocol that {here} speaks",
                 where=hello.name,
                 need=" or ".join(map(str, VERSIONS)),
                 have=", ".join(map(str, hello.versions)),
-                fix="update the older of the two hosts",
+                fix=f"update nondum on {older}",
             )
         )
     return max(common)

@@ -280,13 +280,13 @@ class PeerTable:
         match message:
             case Hello() if not link.dialled:
                 admission, known = self._meet(link, message)
-                link.version = agreed_version(message)
+                link.version = agreed_version(message, self.gate.identity.name)
                 link.tell(Welcome(self._hello(known, link.version)))
                 if link.on_peer is not None:
                     link.on_peer()
             case Welcome(hello) if link.dialled:
                 admission, known = self._meet(link, hello)
-                link.version = agreed_version(hello)
+                link.version = agreed_version(hello, self.gate.identity.name)
             case Refused(problem) if link.on_refused is not None:
                 link.on_refused(problem)
                 return
