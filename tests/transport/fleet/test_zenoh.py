@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import dataclasses
 import sys
@@ -9,10 +10,21 @@ from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
-from tests.transport.fleet.fleets import Member, ZenohWorld, refusals, router, zenoh_member
+import zenoh
+from tests.kit.clock import VirtualClock
+from tests.transport.fleet.fleets import (
+    PATIENCE_S,
+    Member,
+    ZenohWorld,
+    refusals,
+    router,
+    zenoh_member,
+)
 
 from nondum.transport.fleet import PeerChanged
+from nondum.transport.fleet.zenoh import STATE_S
 from nondum.transport.fleet.zenoh_line import RouterAccess
+from nondum.transport.fleet.zenoh_node import SILENCE_S, TERMS
 from nondum.transport.peers import (
     DialFailed,
     HostKeys,
@@ -24,6 +36,7 @@ from nondum.transport.peers import (
     Security,
     Trust,
 )
+from nondum.transport.peers.messages import Message, Ping, Pong, Reply, decode
 
 pytestmark = pytest.mark.anyio
 
@@ -33,6 +46,19 @@ def world() -> Iterator[ZenohWorld]:
     made = ZenohWorld()
     yield made
     made.close()
+
+
+@contextlib.contextmanager
+def overheard(world: ZenohWorld) -> Iterator[asyncio.Queue[Message]]:
+    """What goes by way of the router, from now on."""
+    loop, messages = asyncio.get_running_loop(), asyncio.Queue[Message]()
+
+    def take(sample: zenoh.Sample) -> None:
+        loop.call_soon_threadsafe(messages.put_nowait, decode(sample.payload.to_bytes()))
+
+    subscriber = world.router.declare_subscriber("nondum/test/**", take)
+    yield messages
+    subscriber.undeclare()  # type: ignore[no-untyped-call]  # so it is in Zenoh's stubs
 
 
 @contextlib.asynccontextmanager
@@ -57,6 +83,29 @@ async def test_router_that_restarts_loses_nothing_for_good(world: ZenohWorld) ->
         world.router = router(world.port)
         await base.sees(rover, {"fact/b": {"holds": True}})
         assert (await base.told(PeerChanged)).is_whole
+
+
+async def test_hosts_that_tell_all_are_not_pinged(world: ZenohWorld, clock: VirtualClock) -> None:
+    """With n hosts, pings would be n times as much as all that is told."""
+    async with world.member("rover") as rover, world.member("base") as base:
+        await base.told(PeerUp)
+        with overheard(world) as said:
+            for n in range(5):
+                for one in (rover, base):
+                    one.fleet.publish({"count": {"is": n}})
+                await clock.advance(STATE_S)
+                for one, other in ((rover, base), (base, rover)):
+                    await one.sees(other, {"count": {"is": n}})
+            call = base.fleet.call(rover.key, "echo", {"is": "the end"}, deadline_s=PATIENCE_S)
+            assert await call == {"is": "the end"}
+            messages = [await said.get()]
+            while not (isinstance(last := messages[-1], Reply) and last.body == await call):
+                messages.append(await said.get())
+        assert not [message for message in messages if isinstance(message, Ping | Pong)]
+
+
+def test_host_doubts_when_it_has_told_nothing_and_before_it_is_given_up() -> None:
+    assert STATE_S < TERMS.doubt_s(0.0) < TERMS.limit_s(0.0) == SILENCE_S
 
 
 async def test_router_that_is_late_is_waited_for(world: ZenohWorld) -> None:

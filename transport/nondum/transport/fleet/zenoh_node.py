@@ -36,8 +36,16 @@ from nondum.transport.peers.trust import Admission, Trust, TrustState
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""
 TEND_S = 0.5
-TERMS = Terms(tick_s=TEND_S, shortest_beat_s=7.0, longest_beat_s=7.0, overdue_s=0.5)
-"""So that it is asked first, and given up after `SILENCE_S`."""
+TERMS = Terms(
+    tick_s=TEND_S,
+    shortest_beat_s=7.0,
+    longest_beat_s=7.0,
+    overdue_s=0.5,
+    longest_confirm_s=2.5,
+    helpers=0,
+)
+"""So that it is asked first, and given up after `SILENCE_S`. Others' word would come by way of the
+same router, where many that are late together have the most to do."""
 ANSWER_S = 8.0
 """How long a greeting may take to be answered."""
 START_S = 3.0
@@ -155,7 +163,10 @@ class ZenohNode:
 
     def notify_all(self, method: str, args: Body) -> None:
         """Tell every peer something, in one message to the router."""
-        self._line.send_all(encode(Notice(method, args)))
+        now_s = self._loop.time()
+        sent = self._line.send_all(encode(Notice(method, args)))
+        for link in self._peer_table.links:
+            link.note_sent(sent, now_s)
 
     def turn_away(self, peer: PeerKey, problem: Problem) -> None:
         """Cut a peer that breaks the rules. Raises `PeerUnreachable`."""

@@ -82,11 +82,15 @@ class Link:
             return Sent.GONE
         now_s = self._loop.time()  # before it is sent: this host may stand still from then on
         sent = self.route.send(data)
+        self.note_sent(sent, now_s)
+        return sent
+
+    def note_sent(self, sent: Sent, now_s: float) -> None:
+        """Note that this host spoke to the other end, by whatever way."""
         if self._is_silent(now_s):
             self._was_silent, self._resumed_s = True, now_s
         if sent is Sent.SENT:
             self._sent_s = now_s
-        return sent
 
     def is_doubtful(self, now_s: float) -> bool:
         """Whether the other end may have given the link up, since this host was silent."""

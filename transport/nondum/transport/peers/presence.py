@@ -21,8 +21,6 @@ from nondum.transport.peers.messages import Ask, Message, Pong, Vouch, encode
 from nondum.transport.peers.session import ANSWERED, Doubt, OutOfPlace, Session
 from nondum.transport.peers.suspicion import Awake, Terms, Verdict, Watched
 
-HELPERS = 3
-"""Peers that are asked about one that is late."""
 TICKS_AWAKE = 1.5
 """Ticks that count between two looks: if more time has passed, the loop stood still."""
 SOONEST_S = 0.001
@@ -153,7 +151,7 @@ class Presence:
         assert link.session is not None
         number, about = next(self._probes), link.session.admission.key
         able = [one for one in self._sessions.values() if one is not link.session and _helps(one)]
-        helpers = random.sample(able, min(HELPERS, len(able)))
+        helpers = random.sample(able, min(self.terms.helpers, len(able)))
         self._asked[number] = _Asked(link, frozenset(one.admission.key for one in helpers))
         for helper in helpers:
             helper.send(encode(Ask(number, about)))

@@ -32,6 +32,8 @@ class Terms:
     longest_confirm_s: float = 1.5
     """With 100 hosts, a suspected peer's own next ping may still come: 3.6 s after its last."""
     longest_resume_s: float = 2.5
+    helpers: int = 3
+    """Peers that are asked about one that is late: none where all are reached by one way."""
 
     def suspect_s(self, beat_s: float) -> float:
         """Silence after which a peer is suspected.
@@ -72,7 +74,7 @@ class Terms:
         >>> round(Terms().doubt_s(0.3), 2)
         0.7
         """
-        v1_s = max(V1_SILENCE_S, min(V1_BEATS * beat_s, V1_LONGEST_S))
+        v1_s = max(V1_SILENCE_S, min(V1_BEATS * self._bounded(beat_s), V1_LONGEST_S))
         return min(self.limit_s(beat_s), v1_s) - self.tick_s
 
     def _bounded(self, beat_s: float) -> float:
