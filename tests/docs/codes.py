@@ -19,6 +19,8 @@ TABLE = "plugins/sdk/nondum/sdk/codes"
 FOLDERS = (
     "host/nondum",
     "planning/nondum",
+    "plugins/lab/nondum_lab",
+    "plugins/pddl-workbench/nondum_pddl_workbench",
     "plugins/sdk/nondum",
     "transport/nondum",
     "wheelhouse/nondum",

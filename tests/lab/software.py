@@ -24,10 +24,11 @@ CHECKOUT = Path(__file__).parents[2]
 PLAIN = HERE / "plain"
 DISTRIBUTIONS = (
     *("plugins/sdk", "plugins/planner-pyperplan", "plugins/planner-fast-downward", "."),
+    "plugins/pddl-workbench",
 )
 SOURCES = (
     *("pyproject.toml", "host", "planning", "transport", "wheelhouse", "plugins/sdk"),
-    *("plugins/planner-pyperplan", "plugins/planner-fast-downward"),
+    *("plugins/planner-pyperplan", "plugins/planner-fast-downward", "plugins/pddl-workbench"),
     *("packaging", "README.md", "LICENSE"),
 )
 EXTRAS = {"nondum": "fast", "nondum_planner_fast_downward": "engine"}
@@ -58,7 +59,8 @@ exec chroot "$2" /bin/sh -eu -c '
     python3 -m venv --without-pip /opt/nondum
     /opt/nondum/bin/python "$(echo /usr/share/python-wheels/pip-*.whl)/pip" install \
         -q --no-index --find-links /mnt --no-cache-dir --no-compile \
-        "nondum[fast]" nondum-planner-pyperplan "nondum-planner-fast-downward[engine]"
+        "nondum[fast]" nondum-planner-pyperplan "nondum-planner-fast-downward[engine]" \
+        nondum-pddl-workbench
 '
 """
 COMPILE = """
