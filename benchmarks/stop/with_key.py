@@ -10,7 +10,7 @@ import os
 import sys
 from pathlib import Path
 
-from nondum.cli.main import main as nondum
+from nondum.cli import main as nondum
 from nondum.host.sandbox.helper.client import HelperClient
 from nondum.host.sandbox.helper.privileged import InProcess
 from nondum.host.sandbox.helper.stop_key import PressesOfDevice

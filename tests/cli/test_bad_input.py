@@ -13,7 +13,7 @@ import click
 import pytest
 from tests.docs.reference import all_commands
 
-from nondum.cli.main import main
+from nondum.cli import main
 from nondum.sdk import codes
 
 COMMANDS = {name: command for name, command, _ in all_commands()}

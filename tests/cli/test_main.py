@@ -24,7 +24,10 @@ from tests.kit.command_line import (
 )
 
 from nondum.cli.installed_commands import GROUP, installed_commands, summary
-from nondum.cli.main import COMMANDS, cli
+from nondum.cli.root import COMMANDS, cli
+from nondum.cli.stop_first import STOP
+from nondum.host.control.protocol import decode_request, encode_request, encode_result
+from nondum.planning.words.stop_words import is_stop
 
 ROOT_HELP = """\
 Usage: nondum [OPTIONS] COMMAND [ARGS]...
@@ -236,6 +239,31 @@ def test_no_daemon_is_told_with_its_own_exit_code(tmp_path: Path) -> None:
     ran = nondum("--control", nowhere, "status")
     ran.refused(4, "error: HOST_UNREACHABLE").refused(4, "`nondum host run --user`")
     assert ran.out == ""
+
+
+def test_the_robot_is_stopped_before_the_rest_is_imported(tmp_path: Path) -> None:
+    """A command line that cannot be imported at all has stopped it."""
+    (tmp_path / "click.py").write_text("raise SystemExit(7)\n")
+    path = tmp_path / "control.sock"
+    with socket.socket(socket.AF_UNIX) as daemon:
+        daemon.bind(str(path))
+        daemon.listen()
+        ran = in_new_interpreter("stop", PYTHONPATH=str(tmp_path), NONDUM_CONTROL=str(path))
+        assert ran.code == 7
+        connection, _ = daemon.accept()
+        with connection, connection.makefile("rb") as lines:
+            request = decode_request(lines.readline())
+    assert request.verb == "goal"
+    assert is_stop(request.arguments["words"])
+    assert encode_request(request) == STOP
+
+
+def test_what_was_stopped_is_shown(answering: Answering) -> None:
+    stopped = {"goals": ["3"], "halted": [], "peers": ["base"]}
+    control = answering(encode_result({"stopped": stopped}), NO_NAMES)
+    assert nondum("stop", NONDUM_CONTROL=str(control)).ok().out == (
+        "goal 3 is halted\nbase has stopped\n"
+    )
 
 
 def test_the_usual_sockets_are_tried_in_turn(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from tests.docs import codes, packages, sdk_reference
 from tests.docs.dataclass_fields import field_docs
 
 from nondum.cli import explain
-from nondum.cli.main import cli
+from nondum.cli.root import cli
 from nondum.host.config import host_config, parsing
 from nondum.host.config import reference as keys_of
 from nondum.host.config.effective import as_toml

@@ -14,7 +14,7 @@ from tests.docs.dataclass_fields import field_docs
 from tests.docs.reference import DOCS, DOCUMENTS, KEYS, MARK, all_commands, configuration_keys
 from tests.docs.sdk_reference import core_words, message_classes
 
-from nondum.cli.main import cli
+from nondum.cli.root import cli
 from nondum.host.config import host_config, parsing, reference
 from nondum.planning.merge.core import core
 from nondum.sdk import hooks

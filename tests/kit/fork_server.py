@@ -33,7 +33,7 @@ from typing import IO, Any, Self
 from tests.kit.evidence import logged
 
 from nondum.cli.installed_commands import installed_commands
-from nondum.cli.main import COMMANDS
+from nondum.cli.root import COMMANDS
 from nondum.host.jobs.fork_server import ANSWER_BYTES, answer, ask, serve
 from nondum.host.service.malloc import keep_what_is_loaded
 

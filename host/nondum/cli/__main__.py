@@ -1,5 +1,5 @@
 """`python -P -m nondum.cli` is `nondum`."""
 
-from nondum.cli.main import main
+from nondum.cli import main
 
 main()

@@ -8,10 +8,10 @@ from typing import Any
 import click
 
 from nondum.cli import complete, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_REFUSED
+from nondum.cli.session import Session
 from nondum.host.people.replaced import replacing
-from nondum.planning.words.stop_words import STOPS
 from nondum.sdk.errors import GoalRefused, Problem
 
 _NOT_HAD = ("suspended", "halted", "unknown")
@@ -227,7 +227,7 @@ def stop(session: Session) -> None:
 
     Example: nondum stop
     """
-    _show_stopped(session, session.ask("goal", words=STOPS[0])["stopped"])
+    _show_stopped(session, session.stop())
 
 
 def _show_stopped(session: Session, halted: dict[str, Any]) -> None:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import complete, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import tell_problem
 from nondum.cli.judge import FOLDER
 from nondum.cli.machine import this_machine
+from nondum.cli.session import Session
 from nondum.cli.table import table
 from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 

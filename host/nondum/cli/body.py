@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.cli.table import table
 from nondum.planning.words.pattern import with_blanks
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from nondum.cli.connection import Session
+from nondum.cli.session import Session
 from nondum.sdk.errors import NondumError
 
 PATIENCE_S = 0.5

@@ -10,8 +10,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_PROBLEMS, tell_problem
+from nondum.cli.session import Session
 from nondum.cli.table import table
 from nondum.host.config import host_config, reference
 from nondum.host.config.effective import Asked, as_toml, effective, file_of, remarks, settings

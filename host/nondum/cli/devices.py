@@ -10,7 +10,8 @@ import click
 
 from nondum.cli import failure, render
 from nondum.cli.advise import wheelhouse_option
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.cli.table import cell, table
 from nondum.sdk.errors import ConfigRefused, Problem
 

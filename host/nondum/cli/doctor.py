@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.doctor_disks import disks
 from nondum.cli.failure import EXIT_PROBLEMS
+from nondum.cli.session import Session
 from nondum.cli.table import table
 
 if TYPE_CHECKING:

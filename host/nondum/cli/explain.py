@@ -12,7 +12,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.sdk import codes
 from nondum.sdk.codes import Code
 from nondum.sdk.errors import ConfigRefused, Problem

@@ -12,7 +12,8 @@ import click
 
 from nondum.cli import render
 from nondum.cli.config import asked_options
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.host.config.effective import Asked, effective
 from nondum.host.core.records.safety import Safety
 from nondum.host.service.notify import Notifier

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
 import click
 
 from nondum.sdk.errors import ConfigRefused, Problem
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "nondum.commands"
 
@@ -20,6 +23,8 @@ GROUP = "nondum.commands"
 @cache
 def installed_commands() -> Mapping[str, EntryPoint]:
     """Those of this environment, by their names."""
+    from importlib.metadata import entry_points  # as slow to import as click
+
     return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.sdk.errors import PayloadRefused, Problem
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ import click
 
 from nondum.cli import render
 from nondum.cli.config import which_options
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.host.config.effective import Asked, effective
 from nondum.host.core.printable import printable
 from nondum.sdk.errors import Problem, TrustRefused

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 
 if TYPE_CHECKING:
     from nondum.wheelhouse.trust.public_key import PublicKey

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nondum.cli.connection import Session
+from nondum.cli.session import Session
 from nondum.sdk.errors import HostUnreachable
 
 if TYPE_CHECKING:

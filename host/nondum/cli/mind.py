@@ -19,8 +19,9 @@ from nondum.cli.advise import (
     wheelhouse_option,
     without_number,
 )
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import tell_problem
+from nondum.cli.session import Session
 from nondum.cli.status import show_told
 from nondum.cli.table import cell, table
 from nondum.planning.words.pattern import with_blanks

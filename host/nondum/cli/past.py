@@ -7,7 +7,8 @@ from typing import Any
 import click
 
 from nondum.cli import complete, live, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.cli.table import cell, table
 
 USUAL_ROWS, MOST_ROWS = 200, 100_000

@@ -10,9 +10,10 @@ from typing import Any
 import click
 
 from nondum.cli import complete, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.judge import FOLDER, inspect, loaded_payload, payloads
 from nondum.cli.progress import ProgressLine
+from nondum.cli.session import Session
 from nondum.cli.verify import check, verify
 from nondum.sdk.errors import NondumError
 

@@ -13,8 +13,9 @@ from typing import Any
 import click
 
 from nondum.cli import failure, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_REFUSED
+from nondum.cli.session import Session
 from nondum.cli.table import table
 from nondum.sdk.errors import NondumError, Problem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
-from nondum.cli.main import COMPLETE, PROGRAM
+from nondum.cli.root import COMPLETE, PROGRAM
 
 SHELLS = ("bash", "fish", "zsh")
 

@@ -7,8 +7,9 @@ from typing import Any
 import click
 
 from nondum.cli import live, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.outline import outline
+from nondum.cli.session import Session
 from nondum.cli.table import shown_width
 
 

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_PROBLEMS
 from nondum.cli.judge import FOLDER, payloads, signed
 from nondum.cli.machine import this_machine
 from nondum.cli.progress import ProgressLine
+from nondum.cli.session import Session
 from nondum.sdk.errors import HostUnreachable, NondumError, PayloadRefused, Problem
 
 if TYPE_CHECKING:

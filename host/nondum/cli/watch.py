@@ -18,7 +18,8 @@ from typing import Any, NoReturn
 import click
 
 from nondum.cli import live, render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
+from nondum.cli.session import Session
 from nondum.cli.watch_screen import screen, waiting
 from nondum.sdk.errors import HostUnreachable, NondumError
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_BAD_INPUT, tell_problem
 from nondum.cli.progress import ProgressLine
+from nondum.cli.session import Session
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum_pddl_workbench.files import FILE, loaded, parsed, text_of
 from nondum_pddl_workbench.fragments import Owned, contribution_of, unit_option

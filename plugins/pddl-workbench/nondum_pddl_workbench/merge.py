@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_PROBLEMS, tell_problem
+from nondum.cli.session import Session
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
 from nondum_pddl_workbench.fragments import HOST, Owned, contributions_of, unit_option
 

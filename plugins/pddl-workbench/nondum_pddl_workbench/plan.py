@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nondum.cli import render
-from nondum.cli.connection import Session, json_option
+from nondum.cli.connection import json_option
 from nondum.cli.progress import ProgressLine
+from nondum.cli.session import Session
 from nondum.sdk.errors import Problem
 from nondum_pddl_workbench.files import FILE
 from nondum_pddl_workbench.search import Limits, Outcome, Question, search_options

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import socket
 from collections.abc import Iterator
@@ -10,6 +9,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from nondum.host.config import control_sockets
 from nondum.host.config.confinement_level import Wanted
 from nondum.host.config.feedback_section import FeedbackSection
 from nondum.host.config.stop_section import StopSection
@@ -27,7 +27,7 @@ class HostSection:
     Without one it is made of the machine's."""
     state: Path = Path("/var/lib/nondum")
     """Folder of catalogue, store and venvs."""
-    control: Path = Path("/run/nondum/control.sock")
+    control: Path = Path(control_sockets.SYSTEM)
     """The control socket."""
     system_tree: str = "nondum.host.mind.system_tree:default_tree"
     """`package:function` that makes the system tree."""
@@ -230,18 +230,11 @@ def default_name(hostname: str) -> str:
     return name or "host"
 
 
-def user_state() -> Path:
-    """Where a host that a user runs without root keeps what it knows."""
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "nondum"
-
-
 def user_config() -> HostConfig:
     """The defaults of a host that a user runs without root: state and socket are the user's."""
-    state = user_state()
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    control = (Path(runtime) / "nondum" if runtime else state) / "control.sock"
+    state = Path(control_sockets.user_state())
     return HostConfig(
-        host=HostSection(state=state, control=control),
+        host=HostSection(state=state, control=Path(control_sockets.user_socket())),
         drives=DrivesSection(slots=(state / "slots",), block_devices=False),
         trust=TrustSection(file=None),
         devices=DevicesSection(slots=(state / "device-slots",)),

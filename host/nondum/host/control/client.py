@@ -31,12 +31,20 @@ _NO_CONNECTION = Problem(
 class ControlClient:
     """One connection to a daemon."""
 
-    def __init__(self, path: Path, *, timeout_s: float | None = 30.0) -> None:
-        """Connect. Raises `HostUnreachable` when no daemon listens at `path`."""
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    def __init__(
+        self,
+        path: Path,
+        *,
+        timeout_s: float | None = 30.0,
+        connection: socket.socket | None = None,
+    ) -> None:
+        """Connect, unless by `connection`. Raises `HostUnreachable` when no daemon listens at
+        `path`."""
+        self._socket = connection or socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.settimeout(timeout_s)
         try:
-            self._socket.connect(str(path))
+            if connection is None:
+                self._socket.connect(str(path))
         except OSError as error:
             self._socket.close()
             raise _unreachable(path, error) from error
@@ -50,7 +58,7 @@ class ControlClient:
         not answer in time.
         """
         self._send(verb, arguments)
-        return self._receive()
+        return self.answer()
 
     def ask_for_connection(self, verb: str, **arguments: Any) -> tuple[Any, socket.socket]:
         """The same for a verb whose answer a connection goes along with; the caller closes it."""
@@ -80,7 +88,7 @@ class ControlClient:
         asks something else. Raises `HostUnreachable` when the daemon goes away meanwhile."""
         self._send(verb, arguments)
         while True:
-            yield self._receive()
+            yield self.answer()
 
     def close(self) -> None:
         """Hang up."""
@@ -104,7 +112,8 @@ class ControlClient:
         except OSError as error:
             raise _unreachable(self._path, error) from error
 
-    def _receive(self) -> Any:
+    def answer(self) -> Any:
+        """The next answer to what was asked. Raises as `ask` does."""
         try:
             line = self._lines.readline()
         except OSError as error:

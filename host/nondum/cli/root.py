@@ -4,8 +4,8 @@ own. Other distributions bring more commands (`installed_commands`)."""
 
 from __future__ import annotations
 
-import difflib
 import os
+import socket
 import sys
 from importlib import import_module
 from typing import Any
@@ -14,8 +14,9 @@ import click
 from click.shell_completion import CompletionItem, shell_complete
 
 from nondum.cli import failure
-from nondum.cli.connection import Session, control_option
+from nondum.cli.connection import control_option
 from nondum.cli.installed_commands import installed_commands, load, summary
+from nondum.cli.session import Session
 from nondum.sdk.errors import NondumError, Problem
 
 PROGRAM = "nondum"
@@ -75,6 +76,8 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in COMMANDS and args[0] not in installed_commands():
+            import difflib  # as slow to import as the rest of this module
+
             near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")
@@ -114,11 +117,14 @@ def cli() -> None:
     """
 
 
-def main(arguments: list[str] | None = None) -> None:
+def run(arguments: list[str], asked_to_stop: tuple[str, socket.socket] | None) -> None:
     """Run the command line and exit: 0 done, 1 refused or failed, 2 wrong usage or bad input,
-    3 problems found, 4 no daemon, 130 interrupted, 141 the reader of the output has left."""
+    3 problems found, 4 no daemon, 130 interrupted, 141 the reader of the output has left.
+
+    `asked_to_stop`: what `ask_to_stop` gave, if that was asked already.
+    """
     try:
-        code = _run(sys.argv[1:] if arguments is None else arguments)
+        code = _run(arguments, Session(asked_to_stop=asked_to_stop))
         sys.stdout.flush()
     except BrokenPipeError:  # the reader has left, as after `| head`
         # Nothing can be written, but the interpreter would try, and complain, at its end.
@@ -127,9 +133,8 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code)
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], session: Session) -> int:
     """What click's own `main` would do, but for pipes, which it closes with the wrong code."""
-    session = Session()
     if instruction := os.environ.get(COMPLETE):
         return shell_complete(cli, {"obj": session}, PROGRAM, COMPLETE, instruction)
     color = False if os.environ.get("NO_COLOR") else None
