@@ -19,6 +19,7 @@ TABLE = "plugins/sdk/nondum/sdk/codes"
 FOLDERS = (
     "host/nondum",
     "planning/nondum",
+    "plugins/host-lamps/nondum_host_lamps",
     "plugins/sdk/nondum",
     "transport/nondum",
     "wheelhouse/nondum",

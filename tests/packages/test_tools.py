@@ -20,7 +20,8 @@ from tests.kit.payloads import make_payload
 from tests.packages.conftest import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.long("packages")]
-DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", ".")
+DISTRIBUTIONS = ("plugins/sdk", "plugins/host-lamps", "plugins/planner-pyperplan", ".")
+MORE = ("nondum-host-lamps", "nondum-planner-pyperplan")
 PAYLOAD = "org.example.talker"
 
 
@@ -55,11 +56,11 @@ def nondum(
     if request.param == "pipx":
         words = ["install", "--python", sys.executable, f"--pip-args=--find-links {wheels}", wheel]
     else:
-        more = ["--with", "nondum-planner-pyperplan", "--find-links", str(wheels)]
+        more = [*(word for name in MORE for word in ("--with", name)), "--find-links", str(wheels)]
         words = ["tool", "install", "--python", sys.executable, *more, wheel]
     subprocess.run([tool, *words], env=clean, check=True)
     if request.param == "pipx":
-        more = ["inject", f"--pip-args=--find-links {wheels}", "nondum", "nondum-planner-pyperplan"]
+        more = ["inject", f"--pip-args=--find-links {wheels}", "nondum", *MORE]
         subprocess.run([tool, *more], env=clean, check=True)
     return Path(clean["HOME"], ".local/bin/nondum")
 
