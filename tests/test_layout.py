@@ -96,7 +96,7 @@ def test_each_portion_is_typed(portion: str) -> None:
 def test_host_names_no_plugin() -> None:
     """Nothing in what hosts run may know a payload; pyperplan's planner is found by its group."""
     plugins = [p.name for p in (ROOT / "plugins").iterdir() if (p / "pyproject.toml").is_file()]
-    plain = {"gps", "speaker"}  # also words of the design: a type of messages, of units
+    plain = {"gps", "lab", "speaker"}  # also words of the design: a type of messages, of units …
     names = {n for n in plugins if n not in {"sdk", *plain}}
     modules_of = {f"nondum_{n.replace('-', '_')}" for n in {*names, *plain}}
     for portion in PORTIONS:

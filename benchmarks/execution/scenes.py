@@ -7,8 +7,8 @@ from pathlib import Path
 
 from nondum.planning.ground.ground import ground
 from nondum.planning.pddl.facts import parts
-from nondum.planning.workbench.standalone import load
 from nondum.sdk.planner import GroundTask
+from nondum_pddl_workbench.standalone import load
 
 DOMAINS = Path(__file__).with_name("domains")
 NAMES = ("gripper", "logistics", "blocks", "satellite", "rovers", "depot", "follow")

@@ -26,9 +26,9 @@ from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import Planners
 from nondum.planning.ground.bounds import INSTANCES_LIMIT
 from nondum.planning.ground.ground import ground
-from nondum.planning.workbench import standalone
 from nondum.sdk.errors import NondumError
 from nondum.sdk.planner import AlreadyTrue, Answer, GaveUp, Plan, Unsolvable
+from nondum_pddl_workbench import standalone
 
 PAGE = Path(__file__).parents[2] / "docs/reliability/planning.md"
 MEMORY_MB = 512

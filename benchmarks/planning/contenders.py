@@ -143,7 +143,7 @@ def _has_engine() -> bool:
 def _ground(domain: Path, problem: Path, clock: Clock) -> Any:
     from nondum.planning.ground.ground import ground
     from nondum.planning.pddl.parse import parse_formula
-    from nondum.planning.workbench.standalone import load
+    from nondum_pddl_workbench.standalone import load
 
     clock.take("grammar", lambda: parse_formula("(and)", "nothing"))
     texts = (domain.read_text(encoding="utf-8"), problem.read_text(encoding="utf-8"))

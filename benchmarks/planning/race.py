@@ -17,9 +17,9 @@ from benchmarks.planning.contenders import GAVE_UP, PLAN
 from benchmarks.planning.problems import Problem
 from benchmarks.planning.results import Attempt
 
-from nondum.planning.workbench.rehearsal import Rehearsed, rehearsed
-from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.errors import FragmentRefused
+from nondum_pddl_workbench.rehearsal import Rehearsed, rehearsed
+from nondum_pddl_workbench.standalone import Standalone, load
 
 ROOT = Path(__file__).parents[2]
 GRACE_S = 0.5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -14,8 +15,15 @@ from pathlib import Path
 import click
 import pytest
 from tests.cli.conftest import Answering
-from tests.kit.command_line import clean_environment, command, in_terminal, nondum
+from tests.kit.command_line import (
+    clean_environment,
+    command,
+    in_new_interpreter,
+    in_terminal,
+    nondum,
+)
 
+from nondum.cli.installed_commands import GROUP, installed_commands, summary
 from nondum.cli.main import COMMANDS, cli
 
 ROOT_HELP = """\
@@ -140,9 +148,33 @@ def test_a_payload_is_judged_without_what_only_daemons_need(tmp_path: Path) -> N
     assert told.endswith("\n[]\n")
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+HELPS = {name: told for name, (_, told) in COMMANDS.items()} | {
+    name: summary(entry) for name, entry in installed_commands().items()
+}
+
+
+@pytest.mark.parametrize("name", HELPS)
 def test_the_root_help_says_what_the_command_says(name: str) -> None:
-    assert (ALL_COMMANDS[name].help or "").splitlines()[0] == COMMANDS[name][1]
+    assert (ALL_COMMANDS[name].help or "").splitlines()[0] == HELPS[name]
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["", "import click\nraise RuntimeError\n", "mine = 1\n"],
+    ids=["missing", "fails", "no command"],
+)
+def test_command_of_another_package_that_does_not_work_is_told(module: str, tmp_path: Path) -> None:
+    package = tmp_path / "other-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Name: other\nVersion: 1.0\nSummary: What others do.\n")
+    (package / "entry_points.txt").write_text(f"[{GROUP}]\nmine = other:mine\nhalt = other:mine\n")
+    if module:
+        (tmp_path / "other.py").write_text(module)
+    others = {"PYTHONPATH": str(tmp_path)}
+    helped = in_new_interpreter("--help", **others).ok().out
+    assert re.search(r"^  mine +What others do\.$", helped, re.MULTILINE)
+    in_new_interpreter("mine", **others).refused(2, "EXTENSION_BROKEN")
+    assert in_new_interpreter("halt", "--help", **others).ok().out.startswith("Usage: nondum halt")
 
 
 @pytest.mark.parametrize("name", ALL_COMMANDS)

@@ -20,6 +20,8 @@ FOLDERS = (
     "host/nondum",
     "planning/nondum",
     "plugins/host-lamps/nondum_host_lamps",
+    "plugins/lab/nondum_lab",
+    "plugins/pddl-workbench/nondum_pddl_workbench",
     "plugins/sdk/nondum",
     "transport/nondum",
     "wheelhouse/nondum",

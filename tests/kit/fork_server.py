@@ -32,6 +32,7 @@ from typing import IO, Any, Self
 
 from tests.kit.evidence import logged
 
+from nondum.cli.installed_commands import installed_commands
 from nondum.cli.main import COMMANDS
 from nondum.host.jobs.fork_server import ANSWER_BYTES, answer, ask, serve
 from nondum.host.service.malloc import keep_what_is_loaded
@@ -42,6 +43,7 @@ IMPORTED = (
     "nondum.host.app",
     "nondum.host.peers.peer_services",
     *(f"nondum.cli.{module}" for module, _ in COMMANDS.values()),
+    *(entry.module for entry in installed_commands().values()),
 )
 """What daemons and commands import, and the fork server before them."""
 

@@ -22,7 +22,10 @@ from tests.lab.recipe import HERE
 
 CHECKOUT = Path(__file__).parents[2]
 PLAIN = HERE / "plain"
-PLUGINS = ("plugins/host-lamps", "plugins/planner-pyperplan", "plugins/planner-fast-downward")
+PLUGINS = (
+    *("plugins/host-lamps", "plugins/pddl-workbench"),
+    *("plugins/planner-fast-downward", "plugins/planner-pyperplan"),
+)
 DISTRIBUTIONS = ("plugins/sdk", *PLUGINS, ".")
 SOURCES = (
     *("pyproject.toml", "host", "planning", "transport", "wheelhouse", "plugins/sdk"),

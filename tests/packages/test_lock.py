@@ -13,8 +13,14 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 LOCK = ROOT / "packaging/debian/requirements.lock"
 BACKEND_LOCK = ROOT / "packaging/debian/backend.lock"
-DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/host-lamps", "plugins/planner-pyperplan")
-OWN = {"nondum", "nondum-sdk", "nondum-host-lamps", "nondum-planner-pyperplan"}
+DISTRIBUTIONS = (
+    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/lab", "plugins/pddl-workbench"),
+    "plugins/planner-pyperplan",
+)
+OWN = {
+    *("nondum", "nondum-sdk", "nondum-host-lamps", "nondum-lab", "nondum-pddl-workbench"),
+    "nondum-planner-pyperplan",
+}
 
 
 def test_lock_satisfies_what_is_declared() -> None:

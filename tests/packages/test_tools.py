@@ -20,8 +20,9 @@ from tests.kit.payloads import make_payload
 from tests.packages.conftest import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.long("packages")]
-DISTRIBUTIONS = ("plugins/sdk", "plugins/host-lamps", "plugins/planner-pyperplan", ".")
-MORE = ("nondum-host-lamps", "nondum-planner-pyperplan")
+PLUGINS = ("plugins/host-lamps", "plugins/planner-pyperplan", "plugins/pddl-workbench")
+DISTRIBUTIONS = ("plugins/sdk", *PLUGINS, ".")
+MORE = ("nondum-host-lamps", "nondum-planner-pyperplan", "nondum-pddl-workbench")
 PAYLOAD = "org.example.talker"
 
 
@@ -56,7 +57,7 @@ def nondum(
     if request.param == "pipx":
         words = ["install", "--python", sys.executable, f"--pip-args=--find-links {wheels}", wheel]
     else:
-        more = [*(word for name in MORE for word in ("--with", name)), "--find-links", str(wheels)]
+        more = ["--find-links", str(wheels), *(f"--with={name}" for name in MORE)]
         words = ["tool", "install", "--python", sys.executable, *more, wheel]
     subprocess.run([tool, *words], env=clean, check=True)
     if request.param == "pipx":

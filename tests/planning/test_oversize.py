@@ -25,9 +25,9 @@ from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.goal import parse_goal
 from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
-from nondum.planning.workbench import standalone
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan
+from nondum_pddl_workbench import standalone
 
 FOLLOW = "(following self person)"
 

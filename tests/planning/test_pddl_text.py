@@ -15,8 +15,8 @@ from nondum.planning.ground.pddl_text import pddl_text
 from nondum.planning.merge.goal import parse_goal
 from nondum.planning.merge.merge import merge
 from nondum.planning.pddl.wording import without_dots
-from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.planner import GroundTask, PddlTask
+from nondum_pddl_workbench.standalone import Standalone, load
 
 EYE = """(:predicates (seen ?c - class ?h - host))
   (:action look :parameters (?u - camera ?c - class ?h - host)

@@ -9,8 +9,8 @@ from tests.planning.differential.texts import TEXTS, Text
 
 from nondum.planning.ground.lifted import Meaning
 from nondum.planning.search import solve
-from nondum.planning.workbench.rehearsal import rehearsed
 from nondum.sdk.planner import Plan
+from nondum_pddl_workbench.rehearsal import rehearsed
 
 BY_NAME = {text.name: text for text in TEXTS}
 

@@ -6,9 +6,9 @@ import pytest
 
 from nondum.planning.ground.ground import ground
 from nondum.planning.search import solve
-from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import GroundTask, Plan
+from nondum_pddl_workbench.standalone import Standalone, load
 
 DOMAIN = """(define (domain ferry)
   (:types port - place ship)

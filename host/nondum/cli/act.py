@@ -84,24 +84,25 @@ def goal(
         if words or pddl is not None:
             raise click.UsageError("--resume takes up a goal that was given: give no other")
         return _shown(session, session.ask("resume", id=resumed), wait=wait)
+    _check_form(words, pddl, kind, keep=keep)
+    said = " ".join(words) or None
+    form = {"words": said, "pddl": pddl, "kind": kind, "priority": priority}
+    given = session.ask("goal", timeout_s=None, **form, yes=yes, keep=keep, wait=wait)
+    return _told(session, said or "", given, priority, wait=wait)
+
+
+def _check_form(words: tuple[str, ...], pddl: str | None, kind: str | None, *, keep: bool) -> None:
+    """Raise `click.UsageError` where options do not go together."""
     if bool(words) == (pddl is not None):
         raise click.UsageError("give the goal in words, or with --pddl")
     if kind and pddl is None:
         raise click.UsageError(f"--{kind} is of use with --pddl only: words say it themselves")
     if keep and pddl is not None:
         raise click.UsageError("--keep is of use with words only")
-    said = " ".join(words) or None
-    given = session.ask(
-        "goal",
-        timeout_s=None,
-        words=said,
-        pddl=pddl,
-        kind=kind,
-        priority=priority,
-        yes=yes,
-        keep=keep,
-        wait=wait,
-    )
+
+
+def _told(session: Session, said: str, given: dict[str, Any], priority: int, *, wait: bool) -> int:
+    """Show what became of it: a stop, an answer, or a goal, which is given once it is confirmed."""
     if "stopped" in given:
         _show_stopped(session, given["stopped"])
         return 0
@@ -109,7 +110,7 @@ def goal(
         _show_answer(session, given)
         return 0
     if "id" not in given:
-        given = _confirmed(session, said or "", given["understood"], priority)
+        given = _confirmed(session, said, given["understood"], priority)
     elif "understood" in given and not session.as_json:
         render.sentence(_understood(given["understood"]))
     return _shown(session, given, wait=wait)

@@ -1,6 +1,6 @@
 """The root group. `nondum --help` must answer in under 0.2 s, so no command module is imported
 before it is needed: names and one-line helps stand here, and a test holds them to the commands'
-own."""
+own. Other distributions bring more commands (`installed_commands`)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from click.shell_completion import CompletionItem, shell_complete
 
 from nondum.cli import failure
 from nondum.cli.connection import Session, control_option
+from nondum.cli.installed_commands import installed_commands, load, summary
 from nondum.sdk.errors import NondumError, Problem
 
 PROGRAM = "nondum"
@@ -37,11 +38,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "host": ("host", "Run the daemon."),
     "journal": ("past", "What happened on this host, oldest first."),
     "keys": ("keys", "Whose payloads robots run, and which hosts a fleet certifies."),
-    "lab": ("lab", "Plug a payload into an emulated computer, and tell what became of it."),
     "logs": ("past", "What components have written."),
     "mount": ("act", "Tell where on the body a unit is mounted."),
     "payload": ("payload", "Make, judge and install payloads."),
-    "pddl": ("pddl", "Check, merge and plan PDDL files, without a host."),
     "peers": ("peers", "Other hosts: which are here, and which this host trusts."),
     "place": ("place", "Payloads that run on another host, and where one is to run."),
     "plan": ("mind", "The plans that are being carried out, that of the most urgent goal first."),
@@ -62,32 +61,39 @@ class LazyGroup(click.Group):
     """Knows its commands by name, and imports one when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(COMMANDS)
+        return sorted(_helps())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        module = import_module(f"nondum.cli.{COMMANDS[cmd_name][0]}")
-        command: click.Command = getattr(module, cmd_name)
-        return command
+        if cmd_name in COMMANDS:
+            module = import_module(f"nondum.cli.{COMMANDS[cmd_name][0]}")
+            command: click.Command = getattr(module, cmd_name)
+            return command
+        entry = installed_commands().get(cmd_name)
+        return None if entry is None else load(entry)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in COMMANDS:
-            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+        if args and args[0] not in COMMANDS and args[0] not in installed_commands():
+            near = difflib.get_close_matches(args[0], self.list_commands(ctx), n=1)
             hint = f" Did you mean {near[0]!r}?" if near else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        found = [n for n in self.list_commands(ctx) if n.startswith(incomplete)]
+        found = {name: told for name, told in _helps().items() if name.startswith(incomplete)}
         options = click.Command.shell_complete(self, ctx, incomplete)
-        return [*(CompletionItem(n, help=COMMANDS[n][1]) for n in found), *options]
+        return [*(CompletionItem(name, help=told) for name, told in found.items()), *options]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name][1]) for name in sorted(COMMANDS)])
+            formatter.write_dl(list(_helps().items()))
+
+
+def _helps() -> dict[str, str]:
+    """The one-line help of each command, in the order of the alphabet."""
+    others = {name: summary(entry) for name, entry in installed_commands().items()}
+    return dict(sorted((others | {name: told for name, (_, told) in COMMANDS.items()}).items()))
 
 
 @click.group(

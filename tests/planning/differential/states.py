@@ -10,8 +10,8 @@ from tests.planning.differential.semantics import Problem, State, TooManyStates,
 from nondum.planning.ground.exploration import explore
 from nondum.planning.ground.literal_task import expanded
 from nondum.planning.ground.negation import positive_task
-from nondum.planning.workbench.standalone import Standalone
 from nondum.sdk.planner import GroundTask
+from nondum_pddl_workbench.standalone import Standalone
 
 Graph = Mapping[State, frozenset[tuple[str, State]]]
 

@@ -18,9 +18,9 @@ from tests.planning.differential.texts import TEXTS, Text
 
 from nondum.planning.ground.pddl_text import pddl_text
 from nondum.planning.search import solve
-from nondum.planning.workbench.rehearsal import rehearsed
-from nondum.planning.workbench.standalone import Standalone
 from nondum.sdk.planner import AlreadyTrue, GaveUp, PddlTask, Plan, PlanText, Unsolvable
+from nondum_pddl_workbench.rehearsal import rehearsed
+from nondum_pddl_workbench.standalone import Standalone
 from nondum_planner_fast_downward import FastDownwardPlanner
 from nondum_planner_fast_downward.engine import find_engine
 

@@ -18,9 +18,9 @@ from nondum.planning.ground.progression import progress, start
 from nondum.planning.pddl.facts import is_twin, twin
 from nondum.planning.search import solve
 from nondum.planning.search.validate import validate
-from nondum.planning.workbench.rehearsal import rehearsed
-from nondum.planning.workbench.standalone import load
 from nondum.sdk.planner import AlreadyTrue, GroundTask, Plan, Unsolvable
+from nondum_pddl_workbench.rehearsal import rehearsed
+from nondum_pddl_workbench.standalone import load
 
 
 def graph_of(problem: Problem, task: GroundTask) -> Graph:

@@ -14,8 +14,8 @@ from tests.planning.differential.texts import TEXTS, Text
 
 from nondum.planning.ground.ground import ground
 from nondum.planning.pddl.parse import parse_formula, parse_signature
-from nondum.planning.workbench.standalone import load, load_domain
 from nondum.sdk.errors import FragmentRefused
+from nondum_pddl_workbench.standalone import load, load_domain
 
 PIECES = re.compile(r"[^\s()]+|[()]|\s+")
 STRANGE = [

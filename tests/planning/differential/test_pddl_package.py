@@ -18,8 +18,8 @@ from nondum.planning.ground.pddl_text import pddl_text
 from nondum.planning.pddl.parse import parse_fragment
 from nondum.planning.pddl.syntax import DomainFragment
 from nondum.planning.pddl.wording import without_dots
-from nondum.planning.workbench.standalone import load_domain
 from nondum.sdk.errors import FragmentRefused
+from nondum_pddl_workbench.standalone import load_domain
 
 NOT_READ_BY_THE_OTHER = {"costs"}
 """It knows no functions."""

@@ -13,9 +13,9 @@ from tests.planning.differential.texts import Text, text
 from nondum.host.mind.native_planner import NativePlanner
 from nondum.planning.ground.ground import ground
 from nondum.planning.search import solve
-from nondum.planning.workbench.standalone import load, load_domain
 from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.planner import GaveUp, GroundTask, Plan, Unsolvable
+from nondum_pddl_workbench.standalone import load, load_domain
 from nondum_planner_pyperplan import PyperplanPlanner
 
 ROADS = """(:predicates (at ?x) (road ?x ?y))
@@ -222,7 +222,7 @@ def test_a_parent_that_is_not_declared_is_a_type_all_the_same() -> None:
 SEEDED = """
 import json, sys
 from nondum.planning.ground.ground import ground
-from nondum.planning.workbench.standalone import load
+from nondum_pddl_workbench.standalone import load
 from nondum.host.mind.native_planner import NativePlanner
 from nondum_planner_pyperplan import PyperplanPlanner
 loaded = load(*json.loads(sys.argv[1]))

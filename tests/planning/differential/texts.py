@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from nondum.planning.ground.ground import ground
-from nondum.planning.workbench.standalone import Standalone, load
 from nondum.sdk.planner import GroundTask
+from nondum_pddl_workbench.standalone import Standalone, load
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,44 +67,67 @@ class GoalOrders:
         words, pddl = arguments.optional_text("words"), arguments.optional_text("pddl")
         if (words is None) == (pddl is None):
             raise GoalRefused(Problem("GOAL_FORM", "a goal is given in words, or in PDDL"))
-        if words is not None and is_stop(words):
-            return {"stopped": (await self.stop_all()).to_dict()}
-        if words is not None and (answer := await self.answer(words)) is not None:
-            return {"answer": answer}
+        if words is not None and (done := await self._done_at_once(words)) is not None:
+            return done
         kind = cast(GoalKind | None, arguments.choice("kind", *get_args(GoalKind)))
         highest = HIGHEST_PRIORITY
         priority = arguments.number("priority", 0, at_least=-highest, at_most=highest)
-        said, understood = arguments.optional_text("said"), None
-        if words is not None and self.elsewhere is not None:
-            peer, words = await self.elsewhere.addressee(words)
-            if peer is not None:
-                return await self.elsewhere.give(peer, words, priority)
-        elif words is not None:
-            words = self._unaddressed(words)
-        if words is not None and is_stop(words):
-            return {"stopped": self.stopping.stop().to_dict()}
-        if words is not None and is_stop_for_stranger(words, self.mind):
-            return {"stopped": (await self.stop_all()).to_dict()}
+        said = arguments.optional_text("said")
+        if words is not None:
+            ours = await self._without_name(words, priority)
+            if not isinstance(ours, str):
+                return ours
+            words = ours
         try:
             given = self.mind.give(words=words, pddl=pddl, kind=kind, priority=priority, said=said)
         except GoalRefused as refused:
             if words is None:
                 raise
-            try:
-                understood = await self.translated(words, refused)
-            except GoalRefused as unknown:
-                return self._kept(words, priority, unknown, arguments)
-            if not arguments.flag("yes"):
-                return {"understood": understood.to_dict()}
-            self.mind.people.tell(f"{words!r} is {understood}")
-            given = self.mind.give(
-                pddl=understood.pddl, kind=understood.kind, priority=priority, said=words
-            )
+            return await self._given_as_translated(words, priority, refused, arguments)
+        return await self._committed(given)
+
+    async def _done_at_once(self, words: str) -> Row | None:
+        """What becomes of words that stop the robot, or ask it about itself."""
+        if is_stop(words):
+            return {"stopped": (await self.stop_all()).to_dict()}
+        answer = await self.answer(words)
+        return None if answer is None else {"answer": answer}
+
+    async def _without_name(self, words: str, priority: int) -> str | Row:
+        """The words without this host's name; or what becomes of words that a peer is given, or
+        that stop the robot behind a name."""
+        if self.elsewhere is not None:
+            peer, words = await self.elsewhere.addressee(words)
+            if peer is not None:
+                return await self.elsewhere.give(peer, words, priority)
+        else:
+            words = self._unaddressed(words)
+        if is_stop(words):
+            return {"stopped": self.stopping.stop().to_dict()}
+        if is_stop_for_stranger(words, self.mind):
+            return {"stopped": (await self.stop_all()).to_dict()}
+        return words
+
+    async def _given_as_translated(
+        self, words: str, priority: int, refused: GoalRefused, arguments: Arguments
+    ) -> Row:
+        try:
+            understood = await self.translated(words, refused)
+        except GoalRefused as unknown:
+            return self._kept(words, priority, unknown, arguments)
+        if not arguments.flag("yes"):
+            return {"understood": understood.to_dict()}
+        self.mind.people.tell(f"{words!r} is {understood}")
+        given = self.mind.give(
+            pddl=understood.pddl, kind=understood.kind, priority=priority, said=words
+        )
+        return await self._committed(given) | {"understood": understood.to_dict()}
+
+    async def _committed(self, given: GivenGoal) -> Row:
         await until_committed(
             self.catalogue, self.news, lambda snapshot: self._is_kept(given, snapshot)
         )
-        row = self._row(given)
-        return row | ({"understood": understood.to_dict()} if understood else {})
+        return self._row(given)
 
     async def say(self, arguments: Arguments) -> Row:
         """Take words as if they had been heard: `answer` says what becomes of them.

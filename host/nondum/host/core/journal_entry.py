@@ -14,7 +14,7 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import TRANSITIONS
 
-_SUBJECTS = ("component", "goal", "unit", "device", "drive", "kind", "host", "source")
+_SUBJECTS = ("component", "goal", "unit", "input", "device", "drive", "kind", "host", "source")
 
 _ASKED = (RetryAsked, RollbackAsked)
 _STEPS = {event: row.to.value for (_, event), row in TRANSITIONS.items() if event not in _ASKED}

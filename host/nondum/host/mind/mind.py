@@ -71,8 +71,7 @@ class Mind:
         wall_s: Callable[[], float] = time.time,
     ) -> None:
         """`emit` is told of goals and plans; `ask` asks a component's worker for an acting hook;
-        `deadline_s` bounds a search for a plan, `patience`
-        what behaviours are waited for."""
+        `deadline_s` bounds a search for a plan, `patience` what behaviours are waited for."""
         self.plugins = ComponentPlugins(ask)
         self.beliefs = Beliefs(host, now_s)
         self.queue = GoalQueue()
@@ -86,29 +85,31 @@ class Mind:
         """Rises whenever a view may look different."""
         self.ticks = 0
         """How often the system tree was ticked."""
-        self._calls = calls
-        self._planners = planners
-        self._emit = emit
-        self._halts = Halts()
-        self._news = asyncio.Event()
+        self._calls, self._planners, self._emit = calls, planners, emit
+        self._halts, self._news = Halts(), asyncio.Event()
         self._afterwards: list[Callable[[], None]] = []
         self._viewers = asyncio.Condition()
         self._composing: asyncio.Task[Composition | str] | None = None
         self._told_version: tuple[object, ...] = ()
-        self.pursuit = Pursuit(
+        self.pursuit = self._make_pursuit(now_s, deadline_s, patience or Patience())
+        self.root: Behaviour = system_tree(self._parts())
+        self.views = Views(self, now_s=now_s, wall_s=wall_s)
+
+    def _make_pursuit(
+        self, now_s: Callable[[], float], deadline_s: float, patience: Patience
+    ) -> Pursuit:
+        return Pursuit(
             queue=self.queue,
             beliefs=self.beliefs,
             leaves=self.leaves,
-            planners=planners,
+            planners=self._planners,
             people=self.people,
-            emit=emit,
+            emit=self._emit,
             now_s=now_s,
             deadline_s=deadline_s,
-            patience=patience or Patience(),
+            patience=patience,
             wake=self.wake,
         )
-        self.root: Behaviour = system_tree(self._parts())
-        self.views = Views(self, now_s=now_s, wall_s=wall_s)
 
     # News
 

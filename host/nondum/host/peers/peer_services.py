@@ -195,17 +195,9 @@ class PeerServices:
             on_change=lambda trust: made._on_trust(trust),
             on_certificate=lambda certificate: made._on_certificate(certificate),
         )
-        compute = await asyncio.to_thread(
-            probed, config.host.state, reserve_mb=config.install.reserve_mb
-        )
-        compute["place"] = config.peers.place
+        compute = await asyncio.to_thread(_compute, config)
         placement = Placement(
-            config,
-            folders,
-            children,
-            catalogue,
-            emit,
-            lambda: made.fleet,
+            *(config, folders, children, catalogue, emit, lambda: made.fleet),
             pins=await Pins.open(folders.root / "places.json"),
             compute=compute,
             confinement=workers.launcher.level,
@@ -339,3 +331,8 @@ class PeerServices:
 
     def _on_taken(self) -> None:
         self._emit(UnitsTaken(self._host, self.serving.taken))
+
+
+def _compute(config: HostConfig) -> Compute:
+    reserve_mb = config.install.reserve_mb
+    return probed(config.host.state, reserve_mb=reserve_mb) | {"place": config.peers.place}

@@ -53,8 +53,7 @@ class Worker:
         Raises `OSError` when they cannot be read: then they are still the caller's.
         `on_crowded` is called with how often descriptors could not be sent to it, or by it.
         """
-        self._on_crowded = on_crowded
-        self.spec, self._timing, self._emit = spec, timing, emit
+        self.spec, self._timing, self._emit, self._on_crowded = spec, timing, emit, on_crowded
         self.since_wall_s = time.time()
         """When it was launched, in seconds since 1970."""
         self._loop = asyncio.get_running_loop()
@@ -71,18 +70,21 @@ class Worker:
         with contextlib.ExitStack() as failed:
             self._streams = StandardStreams(spec.component, spec.package, process.outputs, emit)
             failed.callback(self._streams.close)
-            self.link = WorkerLink(
-                link,
-                on_event=self._on_event,
-                on_closed=self._on_hang_up,
-                on_violation=self._on_foul,
-                on_crowded=lambda: on_crowded(1),
-            )
+            self.link = self._open_link(link)
             failed.pop_all()
         self._calls = RunningCalls(
             spec.component, self.link, timing.halt_s, self.gone, self._on_unhalted
         )
         process.exited.add_done_callback(lambda _: self._on_hang_up())
+
+    def _open_link(self, link: socket.socket) -> WorkerLink:
+        return WorkerLink(
+            link,
+            on_event=self._on_event,
+            on_closed=self._on_hang_up,
+            on_violation=self._on_foul,
+            on_crowded=lambda: self._on_crowded(1),
+        )
 
     @property
     def pid(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from nondum.planning.pddl.facts import fact
 from nondum.sdk.description import (
@@ -111,17 +112,10 @@ class Contribution:
         labels: tuple[Label, ...],
     ) -> Contribution:
         """The same from what the describing hooks say (`docs/hooks.md`)."""
-        unit_objects = tuple(
-            UnitObject(unit.name, object_name(host, component, unit.name), unit.type)
-            for unit in units
-        )
+        named = partial(object_name, host, component)
+        unit_objects = tuple(UnitObject(unit.name, named(unit.name), unit.type) for unit in units)
         streams = tuple(
-            StreamObject(
-                slot=output.name,
-                object=object_name(host, component, output.name),
-                type=output.type,
-                unit=object_name(host, component, unit.name),
-            )
+            StreamObject(output.name, named(output.name), output.type, named(unit.name))
             for unit in units
             for output in unit.outputs
         )

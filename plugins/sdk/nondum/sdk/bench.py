@@ -135,18 +135,26 @@ class Bench:
         self._thread.start()
         self.side = self.on_loop(lambda: HostSide(plugin, self._notify))
         """The host's side; reach it through `on_loop` only."""
-        welcome = {
-            "host": host,
-            "component": component,
-            "units": {name: self.objects[name] for name in units},
-            "outputs": {name: self.objects[name] for name in slots},
-            "settings": dict(settings or {}),
-            "scratch": str(scratch),
-            "devices": {
-                name: {"node": node, "properties": {}} for name, node in (devices or {}).items()
-            },
-            "mounts": {self._object(u): _mount(host, *pose) for u, pose in (mounts or {}).items()},
+        welcome = {"host": host, "component": component, "scratch": str(scratch)}
+        self._start(welcome | self._given(settings or {}, devices or {}, mounts or {}))
+
+    def _given(
+        self,
+        settings: Mapping[str, Any],
+        devices: Mapping[str, str],
+        mounts: Mapping[str, tuple[Vector, Vector]],
+    ) -> dict[str, Any]:
+        """What a plugin is given as it starts."""
+        units = self.description.units
+        return {
+            "units": {unit.name: self.objects[unit.name] for unit in units},
+            "outputs": {slot.name: self.objects[slot.name] for u in units for slot in u.outputs},
+            "settings": dict(settings),
+            "devices": {name: {"node": node, "properties": {}} for name, node in devices.items()},
+            "mounts": {self._object(u): _mount(self.host, *at) for u, at in mounts.items()},
         }
+
+    def _start(self, welcome: dict[str, Any]) -> None:
         try:
             answered = self._wait(self.side.start(welcome))
         except BaseException:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 from nondum.sdk.action_fragment import StatedEffect, with_host
@@ -57,22 +59,18 @@ def behaviour(
     `when_lost` says what becomes of it when another host asked for it and is lost: `stop`, `hold`
     what it does, or `finish` it (see `nondum.sdk.description.WHEN_LOST`).
     """
-    phrases = (phrase,) if isinstance(phrase, str) else tuple(phrase or ())
-
-    signature, called = action or "", name
-    if action is None and (found := _SIGNATURE.match(name)):
-        signature, called = name, found[1]
+    found = _SIGNATURE.match(name) if action is None else None
+    signature, called = (name, found[1]) if found else (action or "", name)
     effect = StatedEffect(makes or "", needs) if needs or makes is not None else None
-    if effect:
-        signature = with_host(signature, effect)
+    signature = with_host(signature, effect) if effect else signature
+    phrases = (phrase,) if isinstance(phrase, str) else tuple(phrase or ())
+    return partial(_mark, Behaviour(called, signature, lasting, phrases, "", when_lost), effect)
 
-    def mark(marked: _Marked) -> _Marked:
-        described = Behaviour(called, signature, lasting, phrases, _first_line(marked), when_lost)
-        setattr(marked, BEHAVIOUR_MARK, described)
-        setattr(marked, EFFECT_MARK, effect)
-        return marked
 
-    return mark
+def _mark(behaviour: Behaviour, effect: StatedEffect | None, marked: _Marked) -> _Marked:
+    setattr(marked, BEHAVIOUR_MARK, replace(behaviour, doc=_first_line(marked)))
+    setattr(marked, EFFECT_MARK, effect)
+    return marked
 
 
 def condition(name: str, *, predicates: Sequence[str]) -> Callable[[_Marked], _Marked]:

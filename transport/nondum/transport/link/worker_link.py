@@ -112,6 +112,8 @@ def agreed_version(hello: Hello) -> int:
     """
     common = set(hello.versions) & set(PROTOCOL_VERSIONS)
     if not common:
+        is_older = max(hello.versions) < max(PROTOCOL_VERSIONS)
+        rebuild = "build the payload again with the SDK that belongs to the host"
         raise ProtocolViolation(
             Problem(
                 "PROTO_VERSION",
@@ -119,7 +121,7 @@ def agreed_version(hello: Hello) -> int:
                 "host speaks",
                 need=" or ".join(map(str, PROTOCOL_VERSIONS)),
                 have=", ".join(map(str, hello.versions)),
-                fix="build the payload again with the SDK that belongs to the host",
+                fix=rebuild if is_older else "update nondum on this host",
             )
         )
     return max(common)

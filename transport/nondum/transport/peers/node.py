@@ -73,13 +73,7 @@ class PeerNode:
         self._gate = Gate(identity, trust, clock)
         self._on_event = on_event
         self._peer_table = PeerTable(
-            self._gate,
-            self.epoch,
-            handler,
-            self.refusals,
-            on_event,
-            pulse,
-            allowance=allowance,
+            *(self._gate, self.epoch, handler, self.refusals, on_event, pulse), allowance=allowance
         )
         owner = Owner(
             self._on_accepted,

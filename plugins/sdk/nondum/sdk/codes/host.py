@@ -41,8 +41,8 @@ CODES = (
     ),
     Code(
         "EXTENSION_BROKEN",
-        "An extension of the host cannot be loaded, or failed when it was asked.",
-        "see the log of the daemon; update or uninstall the extension",
+        "An extension of the host, or another package's command, cannot be loaded, or failed.",
+        "update or uninstall it; of an extension, the log of the daemon says more",
     ),
     Code(
         "EXTENSION_MISSING",

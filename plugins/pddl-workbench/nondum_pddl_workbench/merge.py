@@ -11,8 +11,8 @@ import click
 from nondum.cli import render
 from nondum.cli.connection import Session, json_option
 from nondum.cli.failure import EXIT_PROBLEMS, tell_problem
-from nondum.cli.pddl_fragments import HOST, Owned, contributions_of, unit_option
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
+from nondum_pddl_workbench.fragments import HOST, Owned, contributions_of, unit_option
 
 if TYPE_CHECKING:
     from nondum.planning.merge.contribution import Contribution

@@ -11,8 +11,8 @@ import click
 from nondum.cli import render
 from nondum.cli.connection import Session, json_option
 from nondum.cli.failure import EXIT_PROBLEMS, tell_problem
-from nondum.cli.pddl_files import FILE, loaded, text_of
 from nondum.sdk.errors import Problem
+from nondum_pddl_workbench.files import FILE, loaded, text_of
 
 _CLAIM = re.compile(r"^\s*;\s*cost\s*=\s*([0-9]+)", re.MULTILINE | re.IGNORECASE)
 
@@ -31,8 +31,8 @@ def validate(session: Session, domain: Path, problem: Path, plan: Path) -> int:
 
     Example: nondum pddl validate domain.pddl problem.pddl sas_plan
     """
-    from nondum.planning.workbench.ipc_plan import PSEUDO_STEPS, read_plan
-    from nondum.planning.workbench.rehearsal import rehearsed
+    from nondum_pddl_workbench.ipc_plan import PSEUDO_STEPS, read_plan
+    from nondum_pddl_workbench.rehearsal import rehearsed
 
     read = loaded(domain, problem)
     for warning in read.warnings:

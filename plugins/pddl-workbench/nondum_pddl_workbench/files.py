@@ -11,7 +11,7 @@ from nondum.sdk.errors import FragmentRefused, Problem
 
 if TYPE_CHECKING:
     from nondum.planning.pddl.syntax import FragmentSyntax
-    from nondum.planning.workbench.standalone import Standalone
+    from nondum_pddl_workbench.standalone import Standalone
 
 FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
@@ -32,13 +32,13 @@ def text_of(path: Path) -> str:
 def parsed(path: Path) -> FragmentSyntax:
     """A domain or a problem. Raises `FragmentRefused`."""
     from nondum.planning.pddl.parse import parse_fragment
-    from nondum.planning.workbench.standalone import SIZE_LIMIT_BYTES
+    from nondum_pddl_workbench.standalone import SIZE_LIMIT_BYTES
 
     return parse_fragment(text_of(path), str(path), size_limit_bytes=SIZE_LIMIT_BYTES)
 
 
 def loaded(domain: Path, problem: Path) -> Standalone:
     """A domain with a problem of it. Raises `FragmentRefused` with all that is wrong."""
-    from nondum.planning.workbench.standalone import load
+    from nondum_pddl_workbench.standalone import load
 
     return load(text_of(domain), str(domain), text_of(problem), str(problem))

@@ -1,13 +1,13 @@
-"""Commands for PDDL files; none needs a host."""
+"""The group `nondum pddl`; none of its commands needs a host."""
 
 from __future__ import annotations
 
 import click
 
-from nondum.cli.pddl_check import check
-from nondum.cli.pddl_merge import merge
-from nondum.cli.pddl_plan import plan, why
-from nondum.cli.pddl_validate import validate
+from nondum_pddl_workbench.check import check
+from nondum_pddl_workbench.merge import merge
+from nondum_pddl_workbench.plan import plan, why
+from nondum_pddl_workbench.validate import validate
 
 
 @click.group()

@@ -10,10 +10,10 @@ import click
 
 from nondum.cli import render
 from nondum.cli.connection import Session, json_option
-from nondum.cli.pddl_files import FILE
-from nondum.cli.pddl_search import Limits, Outcome, Question, search_options
 from nondum.cli.progress import ProgressLine
 from nondum.sdk.errors import Problem
+from nondum_pddl_workbench.files import FILE
+from nondum_pddl_workbench.search import Limits, Outcome, Question, search_options
 
 if TYPE_CHECKING:
     from nondum.planning.merge.domain import Merged
@@ -118,7 +118,7 @@ def _view(outcome: Outcome) -> dict[str, Any]:
 
 
 def _plan_text(outcome: Outcome, merged: Merged, seconds: dict[str, float]) -> str:
-    from nondum.planning.workbench.ipc_plan import plan_lines
+    from nondum_pddl_workbench.ipc_plan import plan_lines
 
     effects = [action.effect for action in merged.domain.actions.values()]
     is_unit_cost = all(effect.cost == 1 and not effect.cost_functions for effect in effects)

@@ -12,10 +12,10 @@ import click
 from nondum.cli import render
 from nondum.cli.connection import Session, json_option
 from nondum.cli.failure import EXIT_BAD_INPUT, tell_problem
-from nondum.cli.pddl_files import FILE, loaded, parsed, text_of
-from nondum.cli.pddl_fragments import Owned, contribution_of, unit_option
 from nondum.cli.progress import ProgressLine
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum_pddl_workbench.files import FILE, loaded, parsed, text_of
+from nondum_pddl_workbench.fragments import Owned, contribution_of, unit_option
 
 if TYPE_CHECKING:
     from nondum.planning.pddl.syntax import DomainFragment, FragmentSyntax
@@ -122,7 +122,7 @@ def _by_themselves(files: Sequence[Path], show: ProgressLine) -> Iterator[_Judge
 
 
 def _domain(path: Path, found: DomainFragment) -> _Judged:
-    from nondum.planning.workbench.standalone import load_domain
+    from nondum_pddl_workbench.standalone import load_domain
 
     what = f"domain {found.name!r}, {len(found.actions)} actions"
     try:

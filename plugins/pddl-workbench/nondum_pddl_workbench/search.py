@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from nondum.cli.failure import tell_problem
-from nondum.cli.pddl_files import loaded
 from nondum.cli.progress import ProgressLine
 from nondum.sdk.errors import FragmentRefused
+from nondum_pddl_workbench.files import loaded
 
 if TYPE_CHECKING:
     from nondum.host.mind.planners import Found, Planners
-    from nondum.planning.workbench.standalone import Standalone
     from nondum.sdk.planner import Answer, GroundTask, PddlTask
+    from nondum_pddl_workbench.standalone import Standalone
 
 _T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])

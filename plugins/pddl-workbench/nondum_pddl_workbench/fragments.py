@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from nondum.cli.pddl_files import text_of
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum_pddl_workbench.files import text_of
 
 if TYPE_CHECKING:
     from nondum.planning.merge.contribution import Contribution

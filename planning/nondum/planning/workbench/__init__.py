@@ -1,1 +1,0 @@
-"""Tools for PDDL files that are no fragments."""

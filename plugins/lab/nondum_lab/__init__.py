@@ -1,0 +1,1 @@
+"""`nondum lab`: a payload on a whole emulated computer."""

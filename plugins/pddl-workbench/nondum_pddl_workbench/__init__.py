@@ -1,0 +1,1 @@
+"""PDDL files without a host: `nondum pddl`, and what it is made of."""
