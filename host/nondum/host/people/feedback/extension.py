@@ -12,7 +12,7 @@ from nondum.host.people.feedback.speaking import Aloud
 
 @hookimpl
 def feedback_outputs(host: Host) -> Iterator[Output]:
-    """The program and the speech that `[feedback]` asks for."""
+    """The program, and what says states aloud, that `[feedback]` asks for."""
     section = host.config.feedback
     if section.hook:
         yield Hook(section.hook, section.hook_deadline_s)
