@@ -112,6 +112,7 @@ _ALL = (
         (
             "packaging",
             *(f"{HOST}/{name}" for name in ("sources", "sandbox", "service", "people", "peers")),
+            "plugins/host-lamps/nondum_host_lamps",
             "tests/lab",
         ),
         "tests.lab",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,22 @@ def hook(work: Path, text: str) -> Path:
 
 def feedback(*lines: str) -> str:
     return "\n".join((UNCONFINED, "[feedback]", *lines, ""))
+
+
+def without(distribution: str, work: Path) -> tuple[str, ...]:
+    """The program of a daemon in this environment, but for one distribution."""
+    installed, folder = Path(sysconfig.get_path("purelib")), work / "site-packages"
+    folder.mkdir()
+    for path in installed.iterdir():
+        if distribution not in path.name:
+            (folder / path.name).symlink_to(path)
+    main = f"""
+import sys
+sys.path[sys.path.index({str(installed)!r})] = {str(folder)!r}
+from nondum.cli import main
+sys.exit(main())
+"""
+    return (sys.executable, "-c", main, "host", "run", "--user")
 
 
 def until_warned(host: RunningHost, words: str) -> None:
@@ -63,6 +81,15 @@ def test_what_cannot_be_shown_is_told_in_every_status(tmp_path: Path) -> None:
             timeout_s=READY_S,
         )
         assert host.log.count("LAMP_MISSING") == 1
+
+
+def test_lamps_and_sounds_that_lack_their_extension_are_told_in_every_status(
+    tmp_path: Path,
+) -> None:
+    more = feedback('lamps = ["ACT"]', 'player = ["/no/player"]')
+    with running(tmp_path, more=more, program=without("nondum_host_lamps", tmp_path)) as host:
+        for key in ("lamps", "player"):
+            until_warned(host, f"EXTENSION_MISSING feedback.{key}")
 
 
 def test_what_was_told_of_a_drive_that_is_pulled_is_not_shown_any_more(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ TABLE = "plugins/sdk/nondum/sdk/codes"
 FOLDERS = (
     "host/nondum",
     "planning/nondum",
+    "plugins/host-lamps/nondum_host_lamps",
     "plugins/lab/nondum_lab",
     "plugins/pddl-workbench/nondum_pddl_workbench",
     "plugins/sdk/nondum",

@@ -22,13 +22,14 @@ from tests.lab.recipe import HERE
 
 CHECKOUT = Path(__file__).parents[2]
 PLAIN = HERE / "plain"
-DISTRIBUTIONS = (
-    *("plugins/sdk", "plugins/planner-pyperplan", "plugins/planner-fast-downward", "."),
-    "plugins/pddl-workbench",
+PLUGINS = (
+    *("plugins/host-lamps", "plugins/pddl-workbench"),
+    *("plugins/planner-fast-downward", "plugins/planner-pyperplan"),
 )
+DISTRIBUTIONS = ("plugins/sdk", *PLUGINS, ".")
 SOURCES = (
     *("pyproject.toml", "host", "planning", "transport", "wheelhouse", "plugins/sdk"),
-    *("plugins/planner-pyperplan", "plugins/planner-fast-downward", "plugins/pddl-workbench"),
+    *PLUGINS,
     *("packaging", "README.md", "LICENSE"),
 )
 EXTRAS = {"nondum": "fast", "nondum_planner_fast_downward": "engine"}
@@ -55,13 +56,13 @@ set -eu
 mount --bind "$1" "$2/opt/nondum"
 mount --bind "$3" "$2/mnt"
 mount -t tmpfs tmpfs "$2/tmp"
-exec chroot "$2" /bin/sh -eu -c '
+root=$2
+shift 3
+exec chroot "$root" /bin/sh -eu -c '
     python3 -m venv --without-pip /opt/nondum
     /opt/nondum/bin/python "$(echo /usr/share/python-wheels/pip-*.whl)/pip" install \
-        -q --no-index --find-links /mnt --no-cache-dir --no-compile \
-        "nondum[fast]" nondum-planner-pyperplan "nondum-planner-fast-downward[engine]" \
-        nondum-pddl-workbench
-'
+        -q --no-index --find-links /mnt --no-cache-dir --no-compile "$@"
+' sh "$@"
 """
 COMPILE = """
 set -eu
@@ -84,10 +85,11 @@ def _make(machine: Built, commit: str | None, folder: Path) -> None:
     wheels, venv = folder / "wheels", folder / "venv"
     source = _archived(commit, folder / "source") if commit else CHECKOUT
     _own_wheels(source, wheels)
+    wanted = sorted(map(_requirement, wheels.iterdir()))
     for wheel in _dependencies(machine, wheels).glob("*.whl"):
         shutil.copy(wheel, wheels)
     venv.mkdir()
-    call("unshare", "--mount", "sh", "-c", INSTALL, "sh", venv, machine.root, wheels)
+    call("unshare", "--mount", "sh", "-c", INSTALL, "sh", venv, machine.root, wheels, *wanted)
     shutil.copytree(_packaging(source), venv / "packaging")
     _compile(machine, venv)
     make_disk(venv, folder / "disk.img", DISK_MB, label="nondum")
@@ -117,7 +119,7 @@ def _archived(commit: str, folder: Path) -> Path:
 
 
 def _sources(commit: str) -> list[str]:
-    """Of SOURCES, those that a commit has."""
+    """Of SOURCES, those that a commit has: an older one lacks some."""
     return call("git", "-C", CHECKOUT, "ls-tree", "--name-only", commit, *SOURCES).split()
 
 
@@ -134,9 +136,15 @@ def _packaging(source: Path) -> Path:
 
 
 def _own_wheels(source: Path, folder: Path) -> None:
-    places = [source / path for path in DISTRIBUTIONS]
+    places = [source / path for path in DISTRIBUTIONS if (source / path).is_dir()]
     held = ("--no-deps", "--no-index", "--no-build-isolation")
     call(sys.executable, "-m", "pip", "wheel", "-q", *held, "-w", folder, *places)
+
+
+def _requirement(wheel: Path) -> str:
+    """One of our own wheels, with its extras, as pip is told."""
+    name = wheel.name.partition("-")[0]
+    return f"{name}[{EXTRAS[name]}]" if name in EXTRAS else name
 
 
 def _dependencies(machine: Built, own: Path) -> Path:

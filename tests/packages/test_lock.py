@@ -14,11 +14,11 @@ ROOT = Path(__file__).parents[2]
 LOCK = ROOT / "packaging/debian/requirements.lock"
 BACKEND_LOCK = ROOT / "packaging/debian/backend.lock"
 DISTRIBUTIONS = (
-    *("plugins/sdk", ".", "plugins/lab", "plugins/pddl-workbench"),
+    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/lab", "plugins/pddl-workbench"),
     "plugins/planner-pyperplan",
 )
 OWN = {
-    *("nondum", "nondum-sdk", "nondum-lab", "nondum-pddl-workbench"),
+    *("nondum", "nondum-sdk", "nondum-host-lamps", "nondum-lab", "nondum-pddl-workbench"),
     "nondum-planner-pyperplan",
 }
 

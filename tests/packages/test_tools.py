@@ -20,8 +20,9 @@ from tests.kit.payloads import make_payload
 from tests.packages.conftest import ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.long("packages")]
-DISTRIBUTIONS = ("plugins/sdk", "plugins/planner-pyperplan", "plugins/pddl-workbench", ".")
-MORE = ("nondum-planner-pyperplan", "nondum-pddl-workbench")
+PLUGINS = ("plugins/host-lamps", "plugins/planner-pyperplan", "plugins/pddl-workbench")
+DISTRIBUTIONS = ("plugins/sdk", *PLUGINS, ".")
+MORE = ("nondum-host-lamps", "nondum-planner-pyperplan", "nondum-pddl-workbench")
 PAYLOAD = "org.example.talker"
 
 

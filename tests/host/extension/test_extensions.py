@@ -66,16 +66,45 @@ def test_extension_adds_to_what_ships(module: Callable[..., EntryPoint]) -> None
     assert not extensions.problems
 
 
-@pytest.mark.parametrize("hook", ["planners", "feedback_outputs", "listeners"])
+@hookimpl
+def config_keys() -> tuple[str, ...]:
+    return ("feedback.lamps",)
+
+
+@pytest.mark.parametrize(
+    ("lines", "plugins", "missing"),
+    [
+        ("", {}, []),
+        ('lamps = ["a"]\nplayer = ["/b"]', {}, ["feedback.lamps", "feedback.player"]),
+        ('lamps = ["a"]\nplayer = ["/b"]', {"config_keys": config_keys}, ["feedback.player"]),
+        ('lamps = ["a"]', {"config_keys": config_keys}, []),
+    ],
+    ids=["not set", "none is installed", "one is installed for one of them", "one is installed"],
+)
+def test_key_that_lacks_its_extension_is_told(
+    lines: str,
+    plugins: dict[str, Any],
+    missing: list[str],
+    module: Callable[..., EntryPoint],
+    tmp_path: Path,
+) -> None:
+    extensions = Extensions([module("mine", **plugins)])
+    extensions.note_missing(host(tmp_path, f"[feedback]\n{lines}\n").config)
+    told = [(p.code, p.where) for p in extensions.problems]
+    assert told == [("EXTENSION_MISSING", key) for key in missing]
+
+
+@pytest.mark.parametrize("hook", hookspecs.HOOKS)
 def test_extension_that_raises_is_told_and_left_out(
     hook: str, module: Callable[..., EntryPoint], tmp_path: Path
 ) -> None:
     def with_host(host: Host) -> None:
         raise ZeroDivisionError("a mistake")
 
-    functions = {hook: hookimpl(with_host if hook != "planners" else lambda: 1 // 0)}
+    asks_nothing = hook in ("planners", "config_keys")
+    functions = {hook: hookimpl((lambda: 1 // 0) if asks_nothing else with_host)}
     extensions = Extensions([module("broken", **functions)])
-    arguments = {} if hook == "planners" else {"host": host(tmp_path)}
+    arguments = {} if asks_nothing else {"host": host(tmp_path)}
     shipped = [*Extensions([]).asked(hook, **arguments)]
     assert len([*extensions.asked(hook, **arguments)]) == len(shipped)
     assert [(p.code, p.where) for p in extensions.problems] == [("EXTENSION_BROKEN", "broken")]

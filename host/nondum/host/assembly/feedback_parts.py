@@ -21,9 +21,10 @@ def make_feedback(
     more: Callable[[], tuple[StateReason, ...]],
     on_change: Callable[[], None],
 ) -> Feedback:
-    """Subscribe the listeners of extensions, make what their outputs show, and subscribe that.
-    `more` are state reasons of goals that wait."""
+    """Subscribe the listeners of extensions, make what their outputs show, and subscribe that; note
+    which keys lack an extension. `more` are state reasons of goals that wait."""
     config, catalogue, extensions = base.config, base.catalogue, base.extensions
+    extensions.note_missing(config)
     host = Host(config, base.folders.root, catalogue.snapshot, say, mind.people.newest)
     for listener in extensions.asked("listeners", host=host):
         base.bus.subscribe(listener)

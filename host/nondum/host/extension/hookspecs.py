@@ -22,7 +22,7 @@ PROJECT = "nondum.host"
 """The name of pluggy's project, and of the group of entry points."""
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
-HOOKS = ("planners", "feedback_outputs", "listeners")
+HOOKS = ("planners", "feedback_outputs", "listeners", "config_keys")
 
 
 class Output(Protocol):
@@ -78,3 +78,12 @@ def feedback_outputs(host: Host) -> Iterable[Output]:  # type: ignore[empty-body
 def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a specification
     """Functions that are told every event, on the loop: one that changes the catalogue once that is
     committed or, for progress within a plug, held for the next commit."""
+
+
+@hookspec
+def config_keys() -> Iterable[str]:  # type: ignore[empty-body]  # a specification
+    """Keys of the configuration that the extension acts on, such as `feedback.lamps`.
+
+    Of the keys that need an extension, each that is set and that no extension acts on is told in
+    every status (`EXTENSION_MISSING`).
+    """

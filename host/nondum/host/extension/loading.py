@@ -11,6 +11,7 @@ from typing import Any
 import pluggy
 from importlib_metadata import EntryPoint, entry_points
 
+from nondum.host.config.host_config import HostConfig
 from nondum.host.extension import hookspecs
 from nondum.sdk.errors import Problem
 
@@ -20,6 +21,8 @@ DEFAULT_PLUGINS = (
     "nondum.host.service.extension",
 )
 """The extensions that ship with nondum."""
+KEYS_OF_EXTENSIONS = ("feedback.lamps", "feedback.player")
+"""Keys of the configuration that none of these acts on."""
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +56,19 @@ class Extensions:
                 self._note(impl.plugin_name, f"{hook}: {type(error).__name__}: {error}")
             else:
                 yield from chain.from_iterable(answers)
+
+    def note_missing(self, config: HostConfig) -> None:
+        """Add the keys that are set and that no extension acts on to `problems`."""
+        acted_on = set(self.asked("config_keys"))
+        for key in KEYS_OF_EXTENSIONS:
+            section, _, name = key.partition(".")
+            if getattr(getattr(config, section), name) and key not in acted_on:
+                text = (
+                    f"[{section}] {name} has no effect: no extension that is installed acts on it"
+                )
+                problem = Problem("EXTENSION_MISSING", text, where=key)
+                log.warning("%s", problem)
+                self.problems = (*self.problems, problem)
 
     def _add(self, entry: EntryPoint) -> None:
         try:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import json
 import os
 import stat
-import wave
 from pathlib import Path
 
 import pytest
@@ -17,9 +15,7 @@ from nondum.host.core.feedback_state import NOTHING, State, StateReason
 from nondum.host.people.feedback import program
 from nondum.host.people.feedback.hook import Hook
 from nondum.host.people.feedback.outputs import Outlet
-from nondum.host.people.feedback.player import Player
 from nondum.host.people.feedback.speaking import spoken
-from nondum.host.people.feedback.tones import TUNES, wav
 from nondum.sdk.errors import InstallFailed
 
 pytestmark = pytest.mark.anyio
@@ -143,32 +139,6 @@ async def test_an_output_that_fails_is_told_until_it_works(
     [ended] = await asyncio.gather(running, return_exceptions=True)
     assert isinstance(ended, asyncio.CancelledError)
     assert sum("ZeroDivisionError()" in r.getMessage() for r in caplog.records) == 1
-
-
-async def test_a_player_hears_a_tune_once_for_each_state(tmp_path: Path) -> None:
-    heard = tmp_path / "heard"
-    player = Player([script(tmp_path, f"cat >> {heard}")])
-    await player.show(REFUSED)
-    await player.show(StateReason(State.REFUSED, "drive b", "another"))
-    assert heard.read_bytes() == wav(TUNES[State.REFUSED])
-
-
-async def test_a_player_that_cannot_play_is_told(tmp_path: Path) -> None:
-    player = Player([script(tmp_path, "echo no such card; exit 1")])
-    with pytest.raises(InstallFailed, match="no such card") as failed:
-        await player.show(NOTHING)
-    assert failed.value.code == "SOUND_FAILED"
-
-
-@pytest.mark.parametrize("state", State)
-async def test_tunes_are_sound_files_of_a_second_at_most(state: State) -> None:
-    with wave.open(io.BytesIO(wav(TUNES[state]))) as file:
-        assert (file.getnchannels(), file.getsampwidth()) == (1, 2)
-        assert 0.1 < file.getnframes() / file.getframerate() <= 1.2
-
-
-async def test_no_two_tunes_are_alike() -> None:
-    assert len(set(map(tuple, TUNES.values()))) == len(State)
 
 
 SAFE = StateReason(State.SAFE, "drive a", "drive a may be pulled", drive="a")

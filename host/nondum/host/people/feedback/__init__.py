@@ -1,1 +1,1 @@
-"""What a person is shown who has no screen: one state at a time, by lamps, sounds and a hook."""
+"""What a person is shown who has no screen: one state at a time, by outputs of extensions."""

@@ -45,6 +45,11 @@ CODES = (
         "update or uninstall it; of an extension, the log of the daemon says more",
     ),
     Code(
+        "EXTENSION_MISSING",
+        "A key of the configuration needs an extension that is not installed.",
+        "install it (docs/configuration.md names it), or leave the key out",
+    ),
+    Code(
         "CONFIG_FOLDER",
         "A folder of the configuration cannot be used.",
         "see `slots` under the section that is named",

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.people.feedback import program
-from nondum.host.people.feedback.tones import TUNES, wav
 from nondum.sdk.errors import InstallFailed, Problem
+from nondum_host_lamps.tones import TUNES, wav
 
 PLAY_S = 5.0
 """A tune takes one second at most; a sound card may be busy for a while."""

@@ -1,0 +1,1 @@
+"""Lamps and tones that show the state of a nondum host: an extension of the host."""
