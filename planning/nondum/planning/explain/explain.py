@@ -62,8 +62,9 @@ def explain(
     literal_task = expanded(part.merged, found, goal)
     reachable = Relations()
     for number in sorted(reachable_facts(literal_task)):
-        reachable.add(*found.table.facts[number])
-    lasting = frozenset(map(found.table.text, literal_task.believed - _deleted(literal_task)))
+        if number >= 0:
+            reachable.add(*found.table.facts[number])
+    lasting = frozenset(map(found.table.text, literal_task.init - _deleted(literal_task)))
     causes = Tracer(part.merged, Outlook(reachable, lasting, found.members)).causes(goal)
     if causes:
         return Diagnosis(causes)
@@ -73,7 +74,7 @@ def explain(
 def _deleted(literal_task: LiteralTask) -> frozenset[int]:
     deleted = {fact for action in literal_task.actions for fact in action.delete}
     for action in literal_task.actions:
-        deleted.update(*(change.delete for change in action.changes))
+        deleted.update(*(change.delete for change in action.conditional))
     return frozenset(deleted)
 
 

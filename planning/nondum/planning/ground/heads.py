@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-from nondum.planning.ground.instances import Change, Derivation, Instance
+from nondum.planning.ground.instances import Change, Derivation, Instance, Literals
 from nondum.planning.ground.join import Join, Values
 from nondum.planning.ground.preparation import flattened, joins_of
 from nondum.planning.ground.relations import FactTable, Row
 from nondum.planning.merge.domain import Action, DerivedRule, Origin
 from nondum.planning.merge.effect import ConditionalChange
 from nondum.planning.pddl.flat import Flat
+from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import Atom
 
 if TYPE_CHECKING:
@@ -61,8 +62,14 @@ class Head(ABC):
     """A rule of the join, and what happens when it fires."""
 
     def __init__(
-        self, found: Flat, name: str, origins: tuple[Origin, ...], fixpoint: Fixpoint
+        self,
+        found: Flat,
+        own: Condition,
+        name: str,
+        origins: tuple[Origin, ...],
+        fixpoint: Fixpoint,
     ) -> None:
+        """`own` is the part of the flattened condition that is recorded."""
         self.name = name
         self.origins = origins
         self._flat = found
@@ -72,6 +79,8 @@ class Head(ABC):
         self.domains = tuple(domains[name] for name in self.variables)
         """The objects of each variable."""
         self._negative = self.template(found.negative)
+        self._own = self.template(own.positive)
+        self._own_negative = self.template(own.negative) if own.negative else None
 
     @property
     def is_bound(self) -> bool:
@@ -102,6 +111,13 @@ class Head(ABC):
         names = self.names(values)
         return not all(self._fixpoint.static.may_hold(part, names) for part in self._flat.rest)
 
+    def literals(self, values: Values) -> Literals:
+        """Those of its own condition."""
+        positive = self._own.numbers(values)
+        if self._own_negative is None:
+            return positive
+        return positive | {~number for number in self._own_negative.numbers(values)}
+
     def names(self, values: Values) -> dict[str, str]:
         """Variable → object."""
         return dict(zip(self.variables, values, strict=False))
@@ -114,11 +130,9 @@ class Head(ABC):
 class ActionHead(Head):
     def __init__(self, action: Action, fixpoint: Fixpoint) -> None:
         found = flattened(action.parameters, action.precondition)
-        super().__init__(found, action.name, action.origins, fixpoint)
+        super().__init__(found, action.precondition, action.name, action.origins, fixpoint)
         self._action = action
         self._arity = len(action.parameters)
-        self._positive = self.template(action.precondition.positive)
-        self._negative_own = self.template(action.precondition.negative)
         self._add = self.template(action.effect.add)
         self._delete = self.template(action.effect.delete)
         self._changes = bool(action.effect.conditional)
@@ -136,8 +150,7 @@ class ActionHead(Head):
         self._fixpoint.instances[key] = Instance(
             action=self._action,
             row=row,
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
             add=add,
             delete=delete,
         )
@@ -149,13 +162,11 @@ class ChangeHead(Head):
     def __init__(self, action: Action, change: ConditionalChange, fixpoint: Fixpoint) -> None:
         variables = (*action.parameters, *change.variables)
         found = flattened(variables, action.precondition, change.condition)
-        super().__init__(found, action.name, action.origins, fixpoint)
+        super().__init__(found, change.condition, action.name, action.origins, fixpoint)
         self._action = action
         self._change = change
         self._arity = len(action.parameters)
         self._size = len(variables)
-        self._positive = self.template(change.condition.positive)
-        self._negative_own = self.template(change.condition.negative)
         self._add = self.template(change.add)
         self._delete = self.template(change.delete)
         self._seen: set[Row] = set()
@@ -170,8 +181,7 @@ class ChangeHead(Head):
         change = Change(
             condition=self._change.condition,
             names=self.names(values),
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
             add=add,
             delete=self._delete.numbers(values) - add,
         )
@@ -183,11 +193,10 @@ class ChangeHead(Head):
 class DerivedHead(Head):
     def __init__(self, derived: DerivedRule, fixpoint: Fixpoint) -> None:
         found = flattened(derived.parameters, derived.condition)
-        super().__init__(found, derived.head.predicate, derived.origins, fixpoint)
+        name = derived.head.predicate
+        super().__init__(found, derived.condition, name, derived.origins, fixpoint)
         self._derived = derived
         self._arity = len(derived.parameters)
-        self._positive = self.template(derived.condition.positive)
-        self._negative_own = self.template(derived.condition.negative)
         self._head = self.template((derived.head,))
         self._seen: set[Row] = set()
 
@@ -201,8 +210,7 @@ class DerivedHead(Head):
             rule=self._derived,
             names=self.names(values),
             head=next(iter(head)),
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
         )
         self._fixpoint.derivations.append(derivation)
         self._fixpoint.count(self)

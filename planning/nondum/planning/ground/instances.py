@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from nondum.planning.ground.relations import FactTable, Row
 from nondum.planning.merge.domain import Action, DerivedRule
 from nondum.planning.pddl.normal import Condition
+
+Literals: TypeAlias = frozenset[int]
+"""A conjunction: the number of each fact that must hold, and `~number` of each that must not."""
 
 
 @dataclass(slots=True)
@@ -17,8 +21,8 @@ class Change:
     condition: Condition
     names: Mapping[str, str]
     """What the variables of `condition.further` stand for."""
-    positive: frozenset[int]
-    negative: frozenset[int]
+    literals: Literals
+    """The literals of `condition`."""
     add: frozenset[int]
     delete: frozenset[int]
 
@@ -30,9 +34,8 @@ class Instance:
     action: Action
     row: Row
     """The objects, in the order of the parameters."""
-    positive: frozenset[int]
-    negative: frozenset[int]
-    """Facts that must be false."""
+    literals: Literals
+    """Those of the precondition."""
     add: frozenset[int]
     delete: frozenset[int]
     """Without what it also adds: adding wins."""
@@ -57,8 +60,8 @@ class Derivation:
     rule: DerivedRule
     names: Mapping[str, str]
     head: int
-    positive: frozenset[int]
-    negative: frozenset[int]
+    literals: Literals
+    """Those of the condition."""
 
 
 @dataclass(frozen=True, slots=True)
