@@ -40,14 +40,16 @@ def reachable_part(task: LiteralTask) -> LiteralTask:
     )
 
 
-def quick_answer(task: GroundTask) -> AlreadyTrue | Unsolvable | None:
+def quick_answer(
+    task: GroundTask, reached: frozenset[int] | None = None
+) -> AlreadyTrue | Unsolvable | None:
     """The answer that needs no search: the goal holds, or cannot be reached even without deletes.
 
-    None: a planner must look.
+    None: a planner must look. `reached` are the task's `reachable_facts`, where they are known.
     """
     if task.goal <= start(task):
         return AlreadyTrue()
-    unreached = task.goal - reachable_facts(task)
+    unreached = task.goal - (reachable_facts(task) if reached is None else reached)
     if unreached:
         return Unsolvable("relaxed", tuple(task.facts[index] for index in sorted(unreached)))
     return None
