@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from nondum.planning.ground.instances import Exploration, Literals
-from nondum.planning.ground.join import Domains, Join, Rule, Values, Work
+from nondum.planning.ground.join import Domains, Join, Query, Values, Work
 from nondum.planning.ground.matching import Pattern
 from nondum.planning.ground.members import domains_of
 from nondum.planning.ground.relations import Relations, Row
@@ -27,6 +27,7 @@ from nondum.planning.pddl.syntax import (
     TypedName,
     renamed,
 )
+from nondum.sdk.planner import Rule
 
 DISJUNCTS_LIMIT = 12
 """A condition with more is given a derived fact that stands for it."""
@@ -62,8 +63,8 @@ class Expander:
     """What is true and cannot change need not be guarded."""
     work: Work
     """What writing out quantifiers may take."""
-    disjunctions: list[tuple[int, tuple[Literals, ...]]] = field(default_factory=list)
-    """The derived facts that had to be made so far, and what makes each of them true."""
+    _rules: list[Rule] = field(default_factory=list)
+    _made: int = 0
     _relations: Relations = field(default_factory=Relations)
     _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
         default_factory=dict
@@ -165,7 +166,7 @@ class Expander:
         is_selective = self.is_closed or formula.quantifier == "exists"
         domains = domains_of(variables, self.found.members)
         known = dict.fromkeys(names, frozenset[str]())
-        rule = Rule(
+        query = Query(
             variables=(*names, *(variable.name for variable in variables)),
             breadths={name: len(domain) for name, domain in {**known, **domains}.items()},
             patterns=tuple(
@@ -178,7 +179,7 @@ class Expander:
         )
         apart = Quantified(formula.quantifier, variables, part, formula.place)
         of_all = (*known.values(), *(domains[variable.name] for variable in variables))
-        return Join(rule, known=names), apart, of_all
+        return Join(query, known=names), apart, of_all
 
     def _small(self, tree: Tree, name: str) -> Tree:
         """The tree with every disjunction replaced by a fact that stands for it."""
@@ -198,9 +199,15 @@ class Expander:
 
     def _stand_in(self, bodies: Sequence[Literals], name: str) -> Literals:
         """A new fact that holds where one of `bodies` does."""
-        fact = self.found.table.number(name, (str(len(self.disjunctions)),))
-        self.disjunctions.append((fact, tuple(bodies)))
+        fact = self.found.table.number(name, (str(self._made),))
+        self._made += 1
+        self._rules += (Rule(fact, body) for body in bodies)
         return frozenset((fact,))
+
+    def new_rules(self) -> tuple[Rule, ...]:
+        """The rules of the derived facts that had to be made since last time."""
+        rules, self._rules = tuple(self._rules), []
+        return rules
 
 
 def is_possible(literals: Literals) -> bool:

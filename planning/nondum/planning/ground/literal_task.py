@@ -56,7 +56,7 @@ class _Expansion:
             action for instance in self._found.instances for action in self._actions(instance)
         ]
         wanted = self._goal(goal)
-        layers.append(list(self._rules_of_disjunctions()))
+        layers.append(list(self._expander.new_rules()))
         literal_task = LiteralTask(
             self._found.believed, wanted, tuple(actions), tuple(Layer(tuple(r)) for r in layers)
         )
@@ -82,15 +82,8 @@ class _Expansion:
                 bodies = self._expander.alternatives(derivation.literals, further, names)
             rules = layers[layer[rule.head.predicate]]
             rules += (Rule(derivation.head, body) for body in bodies)
-            rules += self._rules_of_disjunctions()
+            rules += self._expander.new_rules()
         return layers
-
-    def _rules_of_disjunctions(self) -> Iterator[Rule]:
-        """The rules of the facts that were made since last time."""
-        made = list(self._expander.disjunctions)
-        self._expander.disjunctions.clear()
-        for fact, bodies in made:
-            yield from (Rule(fact, body) for body in bodies)
 
     def _actions(self, instance: Instance) -> Iterator[GroundAction]:
         cost = self._cost(instance)

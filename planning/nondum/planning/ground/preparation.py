@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Generic, TypeVar
 
-from nondum.planning.ground.join import Domains, Join, Rule
+from nondum.planning.ground.join import Domains, Join, Query
 from nondum.planning.ground.matching import Pattern
 from nondum.planning.pddl.flat import Flat, flat
 from nondum.planning.pddl.normal import Condition
@@ -64,7 +64,7 @@ _prepared: dict[tuple[_Same[Flat], tuple[int, ...]], tuple[tuple[str, Join], ...
 
 def _joins(found: Flat, domains: Domains, growing: tuple[int, ...]) -> tuple[tuple[str, Join], ...]:
     names = tuple(variable.name for variable in found.variables)
-    rule = Rule(
+    query = Query(
         variables=names,
         breadths={name: len(domain) for name, domain in zip(names, domains, strict=True)},
         patterns=tuple(map(Pattern.of, found.positive)),
@@ -72,5 +72,5 @@ def _joins(found: Flat, domains: Domains, growing: tuple[int, ...]) -> tuple[tup
         unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
     )
     if not growing:
-        return (("", Join(rule)),)
-    return tuple((found.positive[index].predicate, Join(rule, index)) for index in growing)
+        return (("", Join(query)),)
+    return tuple((found.positive[index].predicate, Join(query, index)) for index in growing)
