@@ -9,11 +9,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from nondum.planning.ground.instances import Exploration, Literals
-from nondum.planning.ground.join import Domains, Join, Query, Values, Work
+from nondum.planning.ground.instances import Exploration, Literals, Row
+from nondum.planning.ground.join import Domains, Join, Query, Relations, Values, Work
 from nondum.planning.ground.matching import Pattern
 from nondum.planning.ground.members import domains_of
-from nondum.planning.ground.relations import Relations, Row
 from nondum.planning.ground.static import Names, value_of
 from nondum.planning.pddl.normal import condition_of, normal
 from nondum.planning.pddl.syntax import (

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-from nondum.planning.ground.instances import Change, Derivation, Instance, Literals
+from nondum.planning.ground.instances import Change, Derivation, FactTable, Instance, Literals, Row
 from nondum.planning.ground.join import Join, Values
 from nondum.planning.ground.preparation import flattened, joins_of
-from nondum.planning.ground.relations import FactTable, Row
 from nondum.planning.merge.domain import Action, DerivedRule, Origin
 from nondum.planning.merge.effect import ConditionalChange
 from nondum.planning.pddl.flat import Flat

@@ -10,21 +10,50 @@ Concise finite-domain representations for PDDL planning tasks (2009).
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.ground.matching import Pattern
-from nondum.planning.ground.relations import Key, Relations, Row
 
 _FEW = 32
 """Up to this number, objects are looked up one by one rather than found among all rows."""
 
+Key: TypeAlias = tuple[str, tuple[int, ...]]
+"""A predicate, and the positions that are looked up."""
 Values: TypeAlias = list[str]
 """A rule's variables, then the constants that it names; by position."""
 Fire: TypeAlias = Callable[[Values], None]
 Domains: TypeAlias = Sequence[frozenset[str]]
 """For each variable the objects that it may stand for."""
+
+
+class Relations:
+    """Rows by predicate and by the values at those positions that are looked up."""
+
+    def __init__(self) -> None:
+        self._rows: defaultdict[str, list[Row]] = defaultdict(list)
+        self._tables: dict[Key, defaultdict[Row, list[Row]]] = {}
+        self._of: defaultdict[str, list[tuple[tuple[int, ...], defaultdict[Row, list[Row]]]]]
+        self._of = defaultdict(list)
+
+    def add(self, predicate: str, row: Row) -> None:
+        """Add a fact that is not there yet."""
+        self._rows[predicate].append(row)
+        for positions, table in self._of[predicate]:
+            table[tuple([row[position] for position in positions])].append(row)
+
+    def table(self, key: Key) -> Mapping[Row, Sequence[Row]]:
+        """Values at the key's positions → rows; it grows as rows are added."""
+        if key not in self._tables:
+            predicate, positions = key
+            table = self._tables[key] = defaultdict(list)
+            for row in self._rows[predicate]:
+                table[tuple([row[position] for position in positions])].append(row)
+            self._of[predicate].append((positions, table))
+        return self._tables[key]
 
 
 class TooMuchWork(Exception):

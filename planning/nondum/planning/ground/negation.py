@@ -10,9 +10,8 @@ from collections.abc import Iterable, Iterator
 from itertools import product
 
 from nondum.planning.ground.expansion import is_possible
-from nondum.planning.ground.instances import Literals
+from nondum.planning.ground.instances import FactTable, Literals
 from nondum.planning.ground.literal_task import LiteralTask
-from nondum.planning.ground.relations import FactTable
 from nondum.planning.pddl.facts import twin
 from nondum.sdk.errors import FragmentRefused, Problem
 from nondum.sdk.planner import ConditionalEffect, GroundAction, GroundTask, Layer, Rule

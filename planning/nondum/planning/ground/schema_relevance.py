@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from nondum.planning.ground.relations import Row
+from nondum.planning.ground.instances import Row
 from nondum.planning.merge.domain import Action, DerivedRule, Merged, functional_predicates
 from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.normal import Condition, atoms_in, quantified_in

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.ground.join import Work
-from nondum.planning.ground.relations import Row
 from nondum.planning.pddl.syntax import (
     And,
     Atom,
