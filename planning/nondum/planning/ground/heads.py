@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from nondum.planning.ground.instances import Change, Derivation, FactTable, Instance, Literals, Row
-from nondum.planning.ground.join import Join, Values
-from nondum.planning.ground.preparation import flattened, joins_of
+from nondum.planning.ground.join import Domains, Join, Query, Values
+from nondum.planning.ground.matching import Pattern
 from nondum.planning.merge.domain import Action, DerivedRule, Origin
 from nondum.planning.merge.effect import ConditionalChange
-from nondum.planning.pddl.flat import Flat
+from nondum.planning.pddl.flat import Flat, flat
 from nondum.planning.pddl.normal import Condition
-from nondum.planning.pddl.syntax import Atom
+from nondum.planning.pddl.syntax import Atom, TypedName
 
 if TYPE_CHECKING:
     from nondum.planning.ground.exploration import Fixpoint
 
+_T = TypeVar("_T")
+
+_KEPT = 8192
+"""Conditions whose joins are kept, so that one more component costs its own only."""
 _WORK_OF_DECIDING = 10
 """What deciding a disjunction or quantifier counts as."""
 _WORK_OF_BINDING = 5
@@ -214,3 +219,63 @@ class DerivedHead(Head):
         self._fixpoint.derivations.append(derivation)
         self._fixpoint.count(self)
         self._fixpoint.reach(head)
+
+
+class _Same(Generic[_T]):
+    """Something that is equal to itself only; saves comparing conditions part by part."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: _T) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.value is other.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
+def flattened(variables: tuple[TypedName, ...], *conditions: Condition) -> Flat:
+    """`flat`, done once for the same conditions."""
+    return _flattened(variables, *map(_Same, conditions))
+
+
+@lru_cache(maxsize=_KEPT)
+def _flattened(variables: tuple[TypedName, ...], *conditions: _Same[Condition]) -> Flat:
+    return flat(variables, *(condition.value for condition in conditions))
+
+
+def joins_of(
+    found: Flat, domains: Domains, growing: frozenset[str]
+) -> tuple[tuple[str, Join], ...]:
+    """The joins of a condition, each with the predicate that triggers it; empty: it runs once.
+
+    `domains` are the objects of each variable: how many there are when a condition is first met
+    decides in which order it is joined. Facts of predicates that are not in `growing` are all there
+    from the beginning.
+    """
+    at = tuple(i for i, atom in enumerate(found.positive) if atom.predicate in growing)
+    key = (_Same(found), at)
+    if key not in _prepared:
+        if len(_prepared) == _KEPT:
+            _prepared.clear()
+        _prepared[key] = _joins(found, domains, at)
+    return _prepared[key]
+
+
+_prepared: dict[tuple[_Same[Flat], tuple[int, ...]], tuple[tuple[str, Join], ...]] = {}
+
+
+def _joins(found: Flat, domains: Domains, growing: tuple[int, ...]) -> tuple[tuple[str, Join], ...]:
+    names = tuple(variable.name for variable in found.variables)
+    query = Query(
+        variables=names,
+        breadths={name: len(domain) for name, domain in zip(names, domains, strict=True)},
+        patterns=tuple(map(Pattern.of, found.positive)),
+        equal=tuple((pair.left.name, pair.right.name) for pair in found.equal),
+        unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
+    )
+    if not growing:
+        return (("", Join(query)),)
+    return tuple((found.positive[index].predicate, Join(query, index)) for index in growing)
