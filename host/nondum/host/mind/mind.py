@@ -36,7 +36,7 @@ from nondum.host.mind.short_names import short_names
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
 from nondum.planning.execute.attempts import Patience
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.goal import Goal, GoalKind, goal_text, parse_goal
