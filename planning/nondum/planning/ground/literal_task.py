@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from nondum.planning.ground.bounds import INSTANCES_LIMIT, work_for
+from nondum.planning.ground.bounds import INSTANCES_LIMIT, Spending, work_for
 from nondum.planning.ground.delete_relaxation import reachable_part
 from nondum.planning.ground.expansion import Expander
 from nondum.planning.ground.instances import Change, Exploration, Instance, Literals
-from nondum.planning.ground.work_limit import Spending
 from nondum.planning.merge.derivation import strata_of
 from nondum.planning.merge.domain import Merged, bind
 from nondum.planning.merge.goal import GoalExpr
