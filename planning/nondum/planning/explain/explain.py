@@ -19,7 +19,7 @@ from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.core import core_graph
 from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.goal import GoalExpr
-from nondum.planning.pddl.facts import parts, predicate_of
+from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.syntax import Atom
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
@@ -57,8 +57,7 @@ def explain(
     """
     believed = frozenset(facts)
     part = relevant_part(merged, goal)
-    known = [text for text in believed if predicate_of(text) in part.wishes.read]
-    found = explore(part.merged, known, objects)
+    found = explore(part.merged, part.known(believed), objects)
     literal_task = expanded(part.merged, found, goal)
     reachable = Relations()
     for number in sorted(reachable_facts(literal_task)):

@@ -19,7 +19,6 @@ from nondum.planning.ground.relevance import helpful
 from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.domain import Merged, functional_predicates
 from nondum.planning.merge.goal import GoalExpr
-from nondum.planning.pddl.facts import predicate_of
 from nondum.sdk.planner import GroundTask
 
 
@@ -40,8 +39,7 @@ def ground(
     does, for more than `limit` bound actions.
     """
     part = relevant_part(merged, goal)
-    read = part.read
-    known = (text for text in facts if predicate_of(text) in read)
+    known = part.known(facts)
     found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
     found = _displaced(found, functional_predicates(merged.domain))
     literal_task = expanded(part.merged, found, goal, limit=limit)
