@@ -12,7 +12,7 @@ from nondum.planning.explain.tracing import Tracer
 from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.ground.exploration import explore
 from nondum.planning.ground.literal_task import LiteralTask, expanded
-from nondum.planning.ground.matching import Relations
+from nondum.planning.ground.matching import FactIndex
 from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.claims import claims_of
 from nondum.planning.merge.contribution import Contribution
@@ -59,7 +59,7 @@ def explain(
     part = relevant_part(merged, goal)
     found = explore(part.merged, part.known(believed), objects)
     literal_task = expanded(part.merged, found, goal)
-    reachable = Relations()
+    reachable = FactIndex()
     for number in sorted(reachable_facts(literal_task)):
         if number >= 0:
             reachable.add(*found.table.facts[number])
