@@ -73,7 +73,7 @@ class Head(ABC):
         origins: tuple[Origin, ...],
         fixpoint: Fixpoint,
     ) -> None:
-        """`own` is the part of the flattened condition that is recorded."""
+        """`own` is the part of the condition that is recorded."""
         self.name = name
         self.origins = origins
         self._flat = found
@@ -116,7 +116,7 @@ class Head(ABC):
         return not all(self._fixpoint.static.may_hold(part, names) for part in self._flat.rest)
 
     def literals(self, values: Values) -> Literals:
-        """Those of its own condition."""
+        """Those of the recorded condition."""
         positive = self._own.numbers(values)
         if self._own_negative is None:
             return positive
