@@ -98,13 +98,15 @@ class Expander:
 
     def _plain(self, literals: Literals) -> Literals | None:
         """The literals that something may make false; None if one never holds."""
-        others = literals - self.found.reached
-        if any(literal >= 0 or ~literal in self._lasting for literal in others):
+        reached, lasting = self.found.reached, self._lasting
+        others = literals - reached
+        if not others:
+            return literals - lasting if self.is_closed else literals
+        if any(literal >= 0 or ~literal in lasting for literal in others):
             return None
         if not self.is_closed:
             return literals
-        false = {literal for literal in others if ~literal in self.found.reached}
-        return (literals - others - self._lasting) | false
+        return literals - others - lasting | {n for n in others if ~n in reached}
 
     def _literal(self, atom: Atom, names: Names, *, is_true: bool) -> Tree:
         row = tuple(value_of(term, names) for term in atom.terms)

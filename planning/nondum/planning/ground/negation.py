@@ -76,12 +76,9 @@ class _Writing:
         self, action: GroundAction, add: frozenset[int], delete: frozenset[int]
     ) -> tuple[frozenset[int], frozenset[int]]:
         """What one effect of an action adds and deletes, the twins included that surely change."""
-        gone = (fact for fact in delete & self._negated if not _adders(action, fact))
-        came = add & self._negated
-        return (
-            self._indices((*add, *(~fact for fact in gone))),
-            self._indices((*delete, *(~fact for fact in came))),
-        )
+        gone = {~fact for fact in delete & self._negated if not _adders(action, fact)}
+        came = {~fact for fact in add & self._negated}
+        return self._indices(add | gone), self._indices(delete | came)
 
     def _conditional(self, action: GroundAction) -> Iterator[ConditionalEffect]:
         for change in action.conditional:
