@@ -80,7 +80,7 @@ def test_one_place_starts_behaviours() -> None:
     calls = re.compile(r"runner\.start\(")
     paths = [*modules("nondum.planning"), *modules("nondum.host")]
     found = [path.name for path in paths if calls.search(path.read_text(encoding="utf-8"))]
-    assert found == ["running_leaves.py"]
+    assert found == ["running.py"]
 
 
 def test_no_portion_claims_the_namespace() -> None:

@@ -15,8 +15,7 @@ from benchmarks.composition.strangers import HOST, stranger, text_bytes
 from benchmarks.measuring import Spread, machine, ratio, table, write
 
 from nondum.planning.execute.replay import replayed
-from nondum.planning.execute.running import RunningAction
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningAction, RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.planning.execute.world import WorldModel

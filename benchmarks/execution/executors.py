@@ -14,7 +14,7 @@ from py_trees.composites import Selector, Sequence
 
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves
 from nondum.planning.execute.step import Step, steps_of
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import Plan

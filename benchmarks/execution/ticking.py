@@ -12,8 +12,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
-from nondum.planning.execute.running import RunState
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves, RunState
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.planner import GroundAction, GroundTask, Plan

@@ -9,8 +9,7 @@ from tests.planning.tasks import search
 
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.running import RunState
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves, RunState
 from nondum.planning.execute.step import Step
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.planning.execute.world import WorldModel

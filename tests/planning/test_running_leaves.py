@@ -7,8 +7,7 @@ from random import Random
 from tests.planning.simulation import Robot, task_tree
 from tests.planning.tasks import FOLLOW_LASTING, FOLLOW_PLAN, follow_task, plan_of
 
-from nondum.planning.execute.running import RunState
-from nondum.planning.execute.running_leaves import LEASE_S, RunningLeaves
+from nondum.planning.execute.running import LEASE_S, RunningLeaves, RunState
 from nondum.planning.execute.step import Step, steps_of
 
 

@@ -23,8 +23,7 @@ from tests.planning.tasks import (
 
 from nondum.planning.execute.attempts import Patience
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.running import RunState
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves, RunState
 from nondum.planning.execute.task_tree import StepLeaf, TaskTree
 from nondum.sdk.planner import GroundTask
 

@@ -16,7 +16,7 @@ from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import Parts, default_tree
-from nondum.planning.execute.running_leaves import LEASE_S
+from nondum.planning.execute.running import LEASE_S
 
 pytestmark = pytest.mark.anyio
 

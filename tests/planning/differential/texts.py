@@ -169,6 +169,19 @@ TEXTS = (
         2,
     ),
     text(
+        "disjunctions-in-rules",
+        """(:types thing place)
+           (:predicates (row ?a - place) (drawn) (column ?x - thing ?b - place) (placed ?x - thing)
+             (shown ?x - thing))
+           (:derived (shown ?x - thing) (exists (?a ?b - place) (and (row ?a) (column ?x ?b))))
+           (:action draw :parameters (?a - place) :precondition (not (drawn))
+             :effect (and (drawn) (row ?a)))
+           (:action place :parameters (?x - thing ?b - place) :precondition (not (placed ?x))
+             :effect (and (placed ?x) (column ?x ?b)))""",
+        """(:objects p q - thing a b c d - place) (:init) (:goal (and (shown p) (shown q)))""",
+        3,
+    ),
+    text(
         "quantifiers",
         """(:types lamp room)
            (:predicates (lit ?l - lamp) (inside ?l - lamp ?r - room) (bright ?r - room) (dark))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from hypothesis import given
-from tests.planning.search.walks import Walk, walks
+from tests.planning.search.walks import Walk, encoded_task, walks
 from tests.planning.tasks import Written, follow_task, ground
 
-from nondum.planning.search.encoding import encode
 from nondum.planning.search.successors import Successors
 from nondum.sdk.planner import GroundAction, GroundTask
 
@@ -37,7 +36,7 @@ def test_tree_finds_the_moves_that_can_be_made(walk: Walk) -> None:
 def test_what_is_true_for_ever_is_no_bit() -> None:
     task = follow_task()
     fluent = {f for f in task.facts if not f.startswith("ready ")}
-    assert encode(task).width <= len(fluent) + 1
+    assert encoded_task(task).width <= len(fluent) + 1
 
 
 def test_cheaper_of_two_like_actions_is_kept() -> None:
@@ -45,11 +44,11 @@ def test_cheaper_of_two_like_actions_is_kept() -> None:
     dear = GroundAction("dear", fact({0}), fact({1}), fact(), 5)
     cheap = GroundAction("cheap", fact({0}), fact({1}), fact(), 2)
     task = GroundTask(("a", "b"), fact({0}), fact({1}), (dear, cheap))
-    assert [move.action for move in encode(task).moves] == [1]
+    assert [move.action for move in encoded_task(task).moves] == [1]
 
 
 def test_action_that_cannot_be_reached_is_left_out() -> None:
     task = ground(
         [Written("go", "here", "there"), Written("fly", "wings", "there")], "here", "there"
     )
-    assert [task.actions[move.action].name for move in encode(task).moves] == ["go"]
+    assert [task.actions[move.action].name for move in encoded_task(task).moves] == ["go"]

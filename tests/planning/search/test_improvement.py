@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.planning.search.walks import Walk, walks
+from tests.planning.search.walks import Walk, encoded_task, walks
 from tests.planning.tasks import gripper_task, plan_of
 
 from nondum.planning.search.changes import Changes
-from nondum.planning.search.encoding import Encoded, encode
+from nondum.planning.search.encoding import Encoded
 from nondum.planning.search.improvement import Improvement, eliminated
 from nondum.planning.search.successors import Successors
 from nondum.planning.search.tree import Moves
@@ -43,7 +43,7 @@ def test_what_is_left_of_a_plan_is_one(walk: Walk, choices: list[int]) -> None:
 def test_detour_is_left_out() -> None:
     task = gripper_task(1)
     there = plan_of(task, "move a b", "move b a", "pick ball0 a", "move a b", "drop ball0 b")
-    encoded = encode(task)
+    encoded = encoded_task(task)
     index = {move.action: i for i, move in enumerate(encoded.moves)}
     plan = eliminated(encoded, tuple(index[step] for step in there.steps))
     names = [task.actions[encoded.moves[i].action].name for i in plan]
@@ -52,7 +52,7 @@ def test_detour_is_left_out() -> None:
 
 def test_search_for_cheaper_plans_ends_with_the_best() -> None:
     """One ball is carried at a time: five walks for three balls."""
-    encoded = encode(gripper_task(3))
+    encoded = encoded_task(gripper_task(3))
     moves = {m.action: i for i, m in enumerate(encoded.moves)}
     carry = [
         name

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from hypothesis import given
 from tests.planning.search.random_tasks import tasks
+from tests.planning.search.walks import encoded_task
 from tests.planning.tasks import FOLLOW_PLAN, follow_task
 
 from nondum.planning.search.changes import Changes
-from nondum.planning.search.encoding import encode
 from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.strategy import solve
 from nondum.sdk.planner import GroundTask, Plan
@@ -15,7 +15,7 @@ from nondum.sdk.planner import GroundTask, Plan
 
 def left_along(task: GroundTask, plan: Plan) -> list[int]:
     """How many landmarks are to come at first, and after each step."""
-    encoded = encode(task)
+    encoded = encoded_task(task)
     landmarks = Landmarks(encoded, Changes(encoded))
     move_of = {move.action: move for move in encoded.moves}
     state = encoded.init

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 from hypothesis import given
 from tests.planning.search.random_tasks import shortest
-from tests.planning.search.walks import Walk, walks
+from tests.planning.search.walks import Walk, encoded_task, walks
 from tests.planning.tasks import delivery_task
 
 from nondum.planning.ground.progression import derived_facts
 from nondum.planning.search.changes import Changes
-from nondum.planning.search.encoding import encode
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.successors import Successors
 
@@ -38,7 +37,7 @@ def test_estimate_knows_what_can_be_done(walk: Walk) -> None:
 
 
 def test_estimate_of_a_state_does_not_depend_on_the_one_before() -> None:
-    encoded = encode(delivery_task())
+    encoded = encoded_task(delivery_task())
     relaxation = Relaxation(encoded, Changes(encoded), [1] * len(encoded.moves))
     first = relaxation.estimate(encoded.init)
     for move in encoded.moves:
@@ -49,7 +48,7 @@ def test_estimate_of_a_state_does_not_depend_on_the_one_before() -> None:
 
 def test_distance_counts_the_moves_of_the_relaxed_plan() -> None:
     """Each package is loaded and unloaded, and a truck goes to each place where it is unloaded."""
-    encoded = encode(delivery_task())
+    encoded = encoded_task(delivery_task())
     estimate = Relaxation(encoded, Changes(encoded), [1] * len(encoded.moves)).estimate(
         encoded.init
     )

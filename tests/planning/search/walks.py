@@ -16,12 +16,18 @@ Walk = tuple[GroundTask, Encoded, list[tuple[State, encoding.State]]]
 """A task, the same encoded, and states of a way through both."""
 
 
+def encoded_task(task: GroundTask) -> Encoded:
+    """A task as `solve` encodes it."""
+    return encode(task, reachable_facts(task))
+
+
 @st.composite
 def walks(draw: st.DrawFn) -> Walk:
     """A task, the same encoded, and the states of a way through both, side by side."""
     task = draw(tasks())
-    assume(task.goal <= reachable_facts(task))
-    encoded = encode(task)
+    reached = reachable_facts(task)
+    assume(task.goal <= reached)
+    encoded = encode(task, reached)
     way = [(start(task), encoded.init)]
     for _ in range(draw(st.integers(0, 4))):
         state, mask = way[-1]

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from nondum.planning.execute.running import RunningAction, RunState
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningAction, RunningLeaves, RunState
 from nondum.planning.execute.step import Step
 from nondum.sdk.errors import GoalRefused
 

@@ -36,11 +36,11 @@ from nondum.host.mind.short_names import short_names
 from nondum.host.mind.system_tree import Duty, Hold, Parts, SystemTree, TaskSlot, default_tree
 from nondum.host.mind.views import Views
 from nondum.planning.execute.attempts import Patience
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import RunningLeaves
 from nondum.planning.execute.step import Step
 from nondum.planning.merge.contribution import Contribution
+from nondum.planning.merge.domain import bind
 from nondum.planning.merge.goal import Goal, GoalKind, goal_text, parse_goal
-from nondum.planning.pddl.facts import fact
 from nondum.sdk.errors import GoalRefused, Problem
 
 log = logging.getLogger(__name__)
@@ -169,10 +169,7 @@ class Mind:
         goal = self._understood(words, pddl, kind)
         text = words or said or goal.text
         if goal.kind == "do":
-            self.beliefs.world.withdraw_effects(
-                fact(atom.predicate, *(term.name for term in atom.terms))
-                for atom in goal.expr.positive
-            )
+            self.beliefs.world.withdraw_effects(bind(atom, {}) for atom in goal.expr.positive)
         given = self.queue.give(text, goal_text(goal.expr), goal.kind, priority=priority, id=id)
         self._emit(GoalGiven(given.id, given.text, given.kind, given.pddl, priority))
         self.wake()

@@ -34,8 +34,7 @@ from nondum.host.mind.situations import Situations
 from nondum.planning.execute.attempts import Attempts, Patience
 from nondum.planning.execute.independence import Reservation
 from nondum.planning.execute.plan_executive import Phase
-from nondum.planning.execute.running import Run
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import Run, RunningLeaves
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.errors import Problem
 from nondum.sdk.planner import GroundTask, Plan

@@ -20,8 +20,7 @@ from nondum.planning.execute.attempts import Patience, Setbacks
 from nondum.planning.execute.partial_order import bits
 from nondum.planning.execute.plan_executive import Phase, PlanExecutive
 from nondum.planning.execute.regression import Regression
-from nondum.planning.execute.running import Run, World
-from nondum.planning.execute.running_leaves import RunningLeaves
+from nondum.planning.execute.running import Run, RunningLeaves, World
 from nondum.planning.execute.step import Step, steps_of, words
 from nondum.planning.execute.step_status import StepStatus, step_status
 from nondum.planning.merge.goal import GoalKind

@@ -12,14 +12,14 @@ from nondum.planning.explain.tracing import Tracer
 from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.ground.exploration import explore
 from nondum.planning.ground.literal_task import LiteralTask, expanded
-from nondum.planning.ground.matching import Relations
+from nondum.planning.ground.matching import FactIndex
 from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.claims import claims_of
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.core import core_graph
 from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.goal import GoalExpr
-from nondum.planning.pddl.facts import parts, predicate_of
+from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.syntax import Atom
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
@@ -57,13 +57,13 @@ def explain(
     """
     believed = frozenset(facts)
     part = relevant_part(merged, goal)
-    known = [text for text in believed if predicate_of(text) in part.wishes.read]
-    found = explore(part.merged, known, objects)
+    found = explore(part.merged, part.known(believed), objects)
     literal_task = expanded(part.merged, found, goal)
-    reachable = Relations()
+    reachable = FactIndex()
     for number in sorted(reachable_facts(literal_task)):
-        reachable.add(*found.table.facts[number])
-    lasting = frozenset(map(found.table.text, literal_task.believed - _deleted(literal_task)))
+        if number >= 0:
+            reachable.add(*found.table.facts[number])
+    lasting = frozenset(map(found.table.text, literal_task.init - _deleted(literal_task)))
     causes = Tracer(part.merged, Outlook(reachable, lasting, found.members)).causes(goal)
     if causes:
         return Diagnosis(causes)
@@ -73,7 +73,7 @@ def explain(
 def _deleted(literal_task: LiteralTask) -> frozenset[int]:
     deleted = {fact for action in literal_task.actions for fact in action.delete}
     for action in literal_task.actions:
-        deleted.update(*(change.delete for change in action.changes))
+        deleted.update(*(change.delete for change in action.conditional))
     return frozenset(deleted)
 
 

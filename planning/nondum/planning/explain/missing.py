@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, product
 
-from nondum.planning.ground.matching import Binding, Pattern, Relations, matched
+from nondum.planning.ground.matching import Binding, FactIndex, Pattern, matched
 from nondum.planning.ground.members import domains_of
 from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import (
@@ -38,7 +38,7 @@ Missing = tuple[Formula, ...]
 class Outlook:
     """What can become true, and what can never become false."""
 
-    reachable: Relations
+    reachable: FactIndex
     lasting: frozenset[str]
     """Facts that hold, and that nothing makes false."""
     members: Mapping[str, frozenset[str]]

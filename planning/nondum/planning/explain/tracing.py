@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from nondum.planning.explain.cause import Cause, Lack, distinct
 from nondum.planning.explain.missing import Missing, Outlook, Shortfall
-from nondum.planning.ground.matching import Binding, Pattern, Relations, matched
+from nondum.planning.ground.matching import Binding, FactIndex, Pattern, matched
 from nondum.planning.ground.members import domains_of
 from nondum.planning.merge.core import HOST_PREDICATES
 from nondum.planning.merge.domain import Merged
@@ -90,7 +90,7 @@ class Tracer:
         self._givers: defaultdict[str, list[_Giver]] = defaultdict(list)
         for giver in _givers(merged):
             self._givers[giver.atom.predicate].append(giver)
-        self._values = Relations()
+        self._values = FactIndex()
         for function in merged.values:
             self._values.add(*parts(function))
         self._shortfalls: dict[_Giver, Shortfall] = {}

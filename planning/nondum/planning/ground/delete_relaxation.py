@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from nondum.planning.ground.progression import start
-from nondum.sdk.planner import AlreadyTrue, GroundTask, Unsolvable
+from nondum.sdk.planner import AlreadyTrue, GroundTask, Layer, Unsolvable
 
 if TYPE_CHECKING:
     from nondum.planning.ground.literal_task import LiteralTask
@@ -20,12 +20,11 @@ Giver: TypeAlias = tuple[frozenset[int], frozenset[int]]
 def reachable_facts(task: GroundTask | LiteralTask) -> frozenset[int]:
     """The facts that some sequence of actions makes true, deletes ignored.
 
-    A negative condition counts as met, and the complement of a derived fact as reachable.
+    What must be false, and the complement of a derived fact, count as met: of a literal task its
+    negative literals are among what is returned.
     """
-    if isinstance(task, GroundTask):
-        complements = {other for layer in task.derived for _, other in layer.complements}
-        return _fixpoint(task.init | complements, _givers(task))
-    return _fixpoint(task.believed, _positive_givers(task))
+    complements = {other for layer in task.derived for _, other in layer.complements}
+    return _fixpoint(task.init | complements, _givers(task))
 
 
 def reachable_part(task: LiteralTask) -> LiteralTask:
@@ -33,19 +32,24 @@ def reachable_part(task: LiteralTask) -> LiteralTask:
     reached = reachable_facts(task)
     return replace(
         task,
-        actions=tuple(a for a in task.actions if a.condition.positive <= reached),
-        rules=tuple(rule for rule in task.rules if rule.body.positive <= reached),
+        actions=tuple(a for a in task.actions if a.precondition <= reached),
+        derived=tuple(
+            Layer(tuple(rule for rule in layer.rules if rule.body <= reached))
+            for layer in task.derived
+        ),
     )
 
 
-def quick_answer(task: GroundTask) -> AlreadyTrue | Unsolvable | None:
+def quick_answer(
+    task: GroundTask, reached: frozenset[int] | None = None
+) -> AlreadyTrue | Unsolvable | None:
     """The answer that needs no search: the goal holds, or cannot be reached even without deletes.
 
-    None: a planner must look.
+    None: a planner must look. `reached` are the task's `reachable_facts`, where they are known.
     """
     if task.goal <= start(task):
         return AlreadyTrue()
-    unreached = task.goal - reachable_facts(task)
+    unreached = task.goal - (reachable_facts(task) if reached is None else reached)
     if unreached:
         return Unsolvable("relaxed", tuple(task.facts[index] for index in sorted(unreached)))
     return None
@@ -61,7 +65,7 @@ def _fixpoint(facts: Iterable[int], givers: Iterable[Giver]) -> frozenset[int]:
         given.append(gives)
         for needed in needs:
             needing[needed].append(index)
-    reached = set(facts)
+    reached = {*facts, *(literal for literal in needing if literal < 0)}
     waiting = list(reached)
     ready = [index for index, count in enumerate(missing) if count == 0]
     while waiting or ready:
@@ -77,7 +81,7 @@ def _fixpoint(facts: Iterable[int], givers: Iterable[Giver]) -> frozenset[int]:
     return frozenset(reached)
 
 
-def _givers(task: GroundTask) -> Iterator[Giver]:
+def _givers(task: GroundTask | LiteralTask) -> Iterator[Giver]:
     for action in task.actions:
         yield action.precondition, action.add
         for effect in action.conditional:
@@ -86,12 +90,3 @@ def _givers(task: GroundTask) -> Iterator[Giver]:
     for layer in task.derived:
         for rule in layer.rules:
             yield rule.body, frozenset((rule.head,))
-
-
-def _positive_givers(task: LiteralTask) -> Iterator[Giver]:
-    for action in task.actions:
-        yield action.condition.positive, action.add
-        for change in action.changes:
-            yield action.condition.positive | change.condition.positive, change.add
-    for rule in task.rules:
-        yield rule.body.positive, frozenset((rule.head,))

@@ -9,13 +9,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from nondum.planning.ground.instances import Exploration
-from nondum.planning.ground.join import Domains, Join, Rule, Values, Work
+from nondum.planning.ground.instances import Exploration, Literals, Row
+from nondum.planning.ground.join import Domains, Join, Query, Relations, Values, Work
 from nondum.planning.ground.matching import Pattern
 from nondum.planning.ground.members import domains_of
-from nondum.planning.ground.relations import Relations, Row
 from nondum.planning.ground.static import Names, value_of
-from nondum.planning.pddl.literals import Literals
 from nondum.planning.pddl.normal import condition_of, normal
 from nondum.planning.pddl.syntax import (
     And,
@@ -28,6 +26,7 @@ from nondum.planning.pddl.syntax import (
     TypedName,
     renamed,
 )
+from nondum.sdk.planner import Rule
 
 DISJUNCTS_LIMIT = 12
 """A condition with more is given a derived fact that stands for it."""
@@ -54,14 +53,6 @@ Tree: TypeAlias = Literals | Both | Either
 TRUE, FALSE = Literals(), Either(())
 
 
-@dataclass(frozen=True, slots=True)
-class Disjunction:
-    """A derived fact that stands for a disjunction: it holds where one of `bodies` does."""
-
-    fact: int
-    bodies: tuple[Literals, ...]
-
-
 @dataclass(slots=True)
 class Expander:
     """Expands conditions over one explored domain."""
@@ -71,8 +62,8 @@ class Expander:
     """What is true and cannot change need not be guarded."""
     work: Work
     """What writing out quantifiers may take."""
-    disjunctions: list[Disjunction] = field(default_factory=list)
-    """The derived facts that had to be made so far."""
+    _rules: list[Rule] = field(default_factory=list)
+    _made: int = 0
     _relations: Relations = field(default_factory=Relations)
     _joins: dict[tuple[Quantified, Row], tuple[Join, Quantified, Domains]] = field(
         default_factory=dict
@@ -107,18 +98,28 @@ class Expander:
 
     def _plain(self, literals: Literals) -> Literals | None:
         """The literals that something may make false; None if one never holds."""
-        if not literals.positive <= self.found.reached or literals.negative & self._lasting:
+        reached, lasting = self.found.reached, self._lasting
+        others = literals - reached
+        if not others:
+            return literals - lasting if self.is_closed else literals
+        if any(literal >= 0 or ~literal in lasting for literal in others):
             return None
         if not self.is_closed:
             return literals
-        return Literals(literals.positive - self._lasting, literals.negative & self.found.reached)
+        return literals - others - lasting | {n for n in others if ~n in reached}
+
+    def _literal(self, atom: Atom, names: Names, *, is_true: bool) -> Tree:
+        row = tuple(value_of(term, names) for term in atom.terms)
+        number = self.found.table.number(atom.predicate, row)
+        plain = self._plain(frozenset((number if is_true else ~number,)))
+        return FALSE if plain is None else plain
 
     def _tree(self, formula: Formula, names: Names) -> Tree:
         match formula:
             case Atom():
-                return self._plain(Literals(positive=self._number(formula, names))) or FALSE
+                return self._literal(formula, names, is_true=True)
             case Not(part=Atom() as atom):
-                return self._plain(Literals(negative=self._number(atom, names))) or FALSE
+                return self._literal(atom, names, is_true=False)
             case Equal():
                 alike = value_of(formula.left, names) == value_of(formula.right, names)
                 return TRUE if alike else FALSE
@@ -134,10 +135,6 @@ class Expander:
             case Quantified():
                 return _either(self._tree(part, n) for part, n in self._bindings(formula, names))
         raise AssertionError(f"not in normal form: {formula}")
-
-    def _number(self, atom: Atom, names: Names) -> frozenset[int]:
-        row = tuple(value_of(term, names) for term in atom.terms)
-        return frozenset((self.found.table.number(atom.predicate, row),))
 
     def _bindings(self, formula: Quantified, names: Names) -> Iterator[tuple[Formula, Names]]:
         """The bindings that matter: those that can make `exists` true, or `forall` false."""
@@ -170,7 +167,7 @@ class Expander:
         is_selective = self.is_closed or formula.quantifier == "exists"
         domains = domains_of(variables, self.found.members)
         known = dict.fromkeys(names, frozenset[str]())
-        rule = Rule(
+        query = Query(
             variables=(*names, *(variable.name for variable in variables)),
             breadths={name: len(domain) for name, domain in {**known, **domains}.items()},
             patterns=tuple(
@@ -183,7 +180,7 @@ class Expander:
         )
         apart = Quantified(formula.quantifier, variables, part, formula.place)
         of_all = (*known.values(), *(domains[variable.name] for variable in variables))
-        return Join(rule, known=names), apart, of_all
+        return Join(query, known=names), apart, of_all
 
     def _small(self, tree: Tree, name: str) -> Tree:
         """The tree with every disjunction replaced by a fact that stands for it."""
@@ -194,18 +191,29 @@ class Expander:
                 bodies: list[Literals] = []
                 for part in parts:
                     bodies += _split(self._small(part, name)) or ()
-                fact = self.found.table.number(name, (str(len(self.disjunctions)),))
-                self.disjunctions.append(Disjunction(fact, tuple(dict.fromkeys(bodies))))
-                return Literals(positive=frozenset((fact,)))
+                return self._stand_in(tuple(dict.fromkeys(bodies)), name)
         return tree
 
     def disjunction(self, alternatives: Sequence[Literals], name: str) -> Literals:
         """One conjunction that holds where one of several does."""
-        if len(alternatives) == 1:
-            return alternatives[0]
-        fact = self.found.table.number(name, (str(len(self.disjunctions)),))
-        self.disjunctions.append(Disjunction(fact, tuple(alternatives)))
-        return Literals(positive=frozenset((fact,)))
+        return alternatives[0] if len(alternatives) == 1 else self._stand_in(alternatives, name)
+
+    def _stand_in(self, bodies: Sequence[Literals], name: str) -> Literals:
+        """A new fact that holds where one of `bodies` does."""
+        fact = self.found.table.number(name, (str(self._made),))
+        self._made += 1
+        self._rules += (Rule(fact, body) for body in bodies)
+        return frozenset((fact,))
+
+    def new_rules(self) -> tuple[Rule, ...]:
+        """The rules of the derived facts that had to be made since last time."""
+        rules, self._rules = tuple(self._rules), []
+        return rules
+
+
+def is_possible(literals: Literals) -> bool:
+    """Whether a conjunction does not contradict itself."""
+    return not any(~literal in literals for literal in literals)
 
 
 def _both(parts: Iterable[Tree]) -> Tree:
@@ -213,11 +221,11 @@ def _both(parts: Iterable[Tree]) -> Tree:
     others: list[Tree] = []
     for part in parts:
         match part:
-            case Literals():
+            case frozenset():
                 plain |= part
             case Both():
                 for inner in part.parts:
-                    if isinstance(inner, Literals):
+                    if isinstance(inner, frozenset):
                         plain |= inner
                     else:
                         others.append(inner)
@@ -225,7 +233,7 @@ def _both(parts: Iterable[Tree]) -> Tree:
                 return FALSE
             case Either():
                 others.append(part)
-    if not plain.is_possible:
+    if not is_possible(plain):
         return FALSE
     return Both((plain, *others)) if others else plain
 
@@ -243,7 +251,7 @@ def _either(parts: Iterable[Tree]) -> Tree:
 def _split(tree: Tree) -> tuple[Literals, ...] | None:
     """The tree as a disjunction of conjunctions; None if there are too many of them."""
     match tree:
-        case Literals():
+        case frozenset():
             return (tree,)
         case Either(parts):
             found: list[Literals] = []
@@ -260,7 +268,7 @@ def _split(tree: Tree) -> tuple[Literals, ...] | None:
                 if split is None or len(products) * len(split) > DISJUNCTS_LIMIT:
                     return None
                 products = [one | other for one in products for other in split]
-            return _least(one for one in products if one.is_possible)
+            return _least(filter(is_possible, products))
 
 
 def _least(conjunctions: Iterable[Literals]) -> tuple[Literals, ...]:

@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT, TooManyBindings, work_for
 from nondum.planning.ground.heads import ActionHead, ChangeHead, DerivedHead, Head
-from nondum.planning.ground.instances import Derivation, Exploration, Instance
-from nondum.planning.ground.join import Join, TooMuchWork
+from nondum.planning.ground.instances import Derivation, Exploration, FactTable, Instance, Row
+from nondum.planning.ground.join import Join, Relations, TooMuchWork
 from nondum.planning.ground.members import Types, domains_of, members_of
-from nondum.planning.ground.relations import FactTable, Relations, Row
 from nondum.planning.ground.schema_relevance import Wishes
 from nondum.planning.ground.static import static_facts
 from nondum.planning.merge.domain import Merged, Origin, functional_predicates

@@ -6,18 +6,19 @@ running task must still guard.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT
-from nondum.planning.ground.displacement import displaced
 from nondum.planning.ground.exploration import explore
+from nondum.planning.ground.instances import Exploration, Row
 from nondum.planning.ground.literal_task import expanded
 from nondum.planning.ground.negation import positive_task
 from nondum.planning.ground.relevance import helpful
 from nondum.planning.ground.schema_relevance import relevant_part
 from nondum.planning.merge.domain import Merged, functional_predicates
 from nondum.planning.merge.goal import GoalExpr
-from nondum.planning.pddl.facts import predicate_of
 from nondum.sdk.planner import GroundTask
 
 
@@ -38,9 +39,32 @@ def ground(
     does, for more than `limit` bound actions.
     """
     part = relevant_part(merged, goal)
-    read = part.read
-    known = (text for text in facts if predicate_of(text) in read)
+    known = part.known(facts)
     found = explore(part.merged, known, objects, limit=limit, wishes=part.wishes)
-    found = displaced(found, functional_predicates(merged.domain))
+    found = _displaced(found, functional_predicates(merged.domain))
     literal_task = expanded(part.merged, found, goal, limit=limit)
     return positive_task(helpful(literal_task), found.table)
+
+
+def _displaced(found: Exploration, functional: frozenset[str]) -> Exploration:
+    """The same with every rival value among what an action deletes (rule M17 of merging)."""
+    if not functional:
+        return found
+    rivals: defaultdict[tuple[str, Row], set[int]] = defaultdict(set)
+    facts = found.table.facts
+    for number in found.reached:
+        predicate, row = facts[number]
+        if predicate in functional and row:
+            rivals[predicate, row[:-1]].add(number)
+
+    def taken_by(add: frozenset[int]) -> set[int]:
+        groups = (facts[number] for number in add)
+        return set().union(*(rivals.get((name, row[:-1]), ()) for name, row in groups if row)) - add
+
+    for instance in found.instances:
+        instance.delete |= taken_by(instance.add)
+        instance.changes = [
+            replace(change, delete=change.delete | taken_by(change.add))
+            for change in instance.changes
+        ]
+    return found

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from nondum.planning.ground.instances import Change, Derivation, Instance
-from nondum.planning.ground.join import Join, Values
-from nondum.planning.ground.preparation import flattened, joins_of
-from nondum.planning.ground.relations import FactTable, Row
+from nondum.planning.ground.instances import Change, Derivation, FactTable, Instance, Literals, Row
+from nondum.planning.ground.join import Domains, Join, Query, Values
+from nondum.planning.ground.matching import Pattern
 from nondum.planning.merge.domain import Action, DerivedRule, Origin
 from nondum.planning.merge.effect import ConditionalChange
-from nondum.planning.pddl.flat import Flat
-from nondum.planning.pddl.syntax import Atom
+from nondum.planning.pddl.flat import Flat, flat
+from nondum.planning.pddl.normal import Condition
+from nondum.planning.pddl.syntax import Atom, TypedName
 
 if TYPE_CHECKING:
     from nondum.planning.ground.exploration import Fixpoint
 
+_T = TypeVar("_T")
+
+_KEPT = 8192
+"""Conditions whose joins are kept, so that one more component costs its own only."""
 _WORK_OF_DECIDING = 10
 """What deciding a disjunction or quantifier counts as."""
 _WORK_OF_BINDING = 5
@@ -61,8 +66,14 @@ class Head(ABC):
     """A rule of the join, and what happens when it fires."""
 
     def __init__(
-        self, found: Flat, name: str, origins: tuple[Origin, ...], fixpoint: Fixpoint
+        self,
+        found: Flat,
+        own: Condition,
+        name: str,
+        origins: tuple[Origin, ...],
+        fixpoint: Fixpoint,
     ) -> None:
+        """`own` is the part of the condition that is recorded."""
         self.name = name
         self.origins = origins
         self._flat = found
@@ -72,6 +83,8 @@ class Head(ABC):
         self.domains = tuple(domains[name] for name in self.variables)
         """The objects of each variable."""
         self._negative = self.template(found.negative)
+        self._own = self.template(own.positive)
+        self._own_negative = self.template(own.negative) if own.negative else None
 
     @property
     def is_bound(self) -> bool:
@@ -102,6 +115,13 @@ class Head(ABC):
         names = self.names(values)
         return not all(self._fixpoint.static.may_hold(part, names) for part in self._flat.rest)
 
+    def literals(self, values: Values) -> Literals:
+        """Those of the recorded condition."""
+        positive = self._own.numbers(values)
+        if self._own_negative is None:
+            return positive
+        return positive | {~number for number in self._own_negative.numbers(values)}
+
     def names(self, values: Values) -> dict[str, str]:
         """Variable → object."""
         return dict(zip(self.variables, values, strict=False))
@@ -114,11 +134,9 @@ class Head(ABC):
 class ActionHead(Head):
     def __init__(self, action: Action, fixpoint: Fixpoint) -> None:
         found = flattened(action.parameters, action.precondition)
-        super().__init__(found, action.name, action.origins, fixpoint)
+        super().__init__(found, action.precondition, action.name, action.origins, fixpoint)
         self._action = action
         self._arity = len(action.parameters)
-        self._positive = self.template(action.precondition.positive)
-        self._negative_own = self.template(action.precondition.negative)
         self._add = self.template(action.effect.add)
         self._delete = self.template(action.effect.delete)
         self._changes = bool(action.effect.conditional)
@@ -136,8 +154,7 @@ class ActionHead(Head):
         self._fixpoint.instances[key] = Instance(
             action=self._action,
             row=row,
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
             add=add,
             delete=delete,
         )
@@ -149,13 +166,11 @@ class ChangeHead(Head):
     def __init__(self, action: Action, change: ConditionalChange, fixpoint: Fixpoint) -> None:
         variables = (*action.parameters, *change.variables)
         found = flattened(variables, action.precondition, change.condition)
-        super().__init__(found, action.name, action.origins, fixpoint)
+        super().__init__(found, change.condition, action.name, action.origins, fixpoint)
         self._action = action
         self._change = change
         self._arity = len(action.parameters)
         self._size = len(variables)
-        self._positive = self.template(change.condition.positive)
-        self._negative_own = self.template(change.condition.negative)
         self._add = self.template(change.add)
         self._delete = self.template(change.delete)
         self._seen: set[Row] = set()
@@ -170,8 +185,7 @@ class ChangeHead(Head):
         change = Change(
             condition=self._change.condition,
             names=self.names(values),
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
             add=add,
             delete=self._delete.numbers(values) - add,
         )
@@ -183,11 +197,10 @@ class ChangeHead(Head):
 class DerivedHead(Head):
     def __init__(self, derived: DerivedRule, fixpoint: Fixpoint) -> None:
         found = flattened(derived.parameters, derived.condition)
-        super().__init__(found, derived.head.predicate, derived.origins, fixpoint)
+        name = derived.head.predicate
+        super().__init__(found, derived.condition, name, derived.origins, fixpoint)
         self._derived = derived
         self._arity = len(derived.parameters)
-        self._positive = self.template(derived.condition.positive)
-        self._negative_own = self.template(derived.condition.negative)
         self._head = self.template((derived.head,))
         self._seen: set[Row] = set()
 
@@ -201,9 +214,68 @@ class DerivedHead(Head):
             rule=self._derived,
             names=self.names(values),
             head=next(iter(head)),
-            positive=self._positive.numbers(values),
-            negative=self._negative_own.numbers(values),
+            literals=self.literals(values),
         )
         self._fixpoint.derivations.append(derivation)
         self._fixpoint.count(self)
         self._fixpoint.reach(head)
+
+
+class _Same(Generic[_T]):
+    """Something that is equal to itself only; saves comparing conditions part by part."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: _T) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.value is other.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
+def flattened(variables: tuple[TypedName, ...], *conditions: Condition) -> Flat:
+    """`flat`, done once for the same conditions."""
+    return _flattened(variables, *map(_Same, conditions))
+
+
+@lru_cache(maxsize=_KEPT)
+def _flattened(variables: tuple[TypedName, ...], *conditions: _Same[Condition]) -> Flat:
+    return flat(variables, *(condition.value for condition in conditions))
+
+
+def joins_of(
+    found: Flat, domains: Domains, growing: frozenset[str]
+) -> tuple[tuple[str, Join], ...]:
+    """The joins of a condition, each with the predicate that triggers it; empty: it runs once.
+
+    `domains` are the objects of each variable: how many there are when a condition is first met
+    decides in which order it is joined. Facts of predicates that are not in `growing` are all there
+    from the beginning.
+    """
+    at = tuple(i for i, atom in enumerate(found.positive) if atom.predicate in growing)
+    key = (_Same(found), at)
+    if key not in _prepared:
+        if len(_prepared) == _KEPT:
+            _prepared.clear()
+        _prepared[key] = _joins(found, domains, at)
+    return _prepared[key]
+
+
+_prepared: dict[tuple[_Same[Flat], tuple[int, ...]], tuple[tuple[str, Join], ...]] = {}
+
+
+def _joins(found: Flat, domains: Domains, growing: tuple[int, ...]) -> tuple[tuple[str, Join], ...]:
+    names = tuple(variable.name for variable in found.variables)
+    query = Query(
+        variables=names,
+        breadths={name: len(domain) for name, domain in zip(names, domains, strict=True)},
+        patterns=tuple(map(Pattern.of, found.positive)),
+        equal=tuple((pair.left.name, pair.right.name) for pair in found.equal),
+        unequal=tuple((pair.left.name, pair.right.name) for pair in found.unequal),
+    )
+    if not growing:
+        return (("", Join(query)),)
+    return tuple((found.positive[index].predicate, Join(query, index)) for index in growing)

@@ -1,13 +1,45 @@
-"""What exploring finds: actions, their conditional effects and rules with objects for variables."""
+"""What exploring finds: facts by number, and actions, their conditional effects and rules bound."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
-from nondum.planning.ground.relations import FactTable, Row
 from nondum.planning.merge.domain import Action, DerivedRule
 from nondum.planning.pddl.normal import Condition
+
+Row: TypeAlias = tuple[str, ...]
+"""The arguments of a fact."""
+Literals: TypeAlias = frozenset[int]
+"""A conjunction: the number of each fact that must hold, and `~number` of each that must not."""
+
+
+@dataclass(slots=True)
+class FactTable:
+    """Every fact that is spoken of, numbered in the order of its first mention."""
+
+    facts: list[tuple[str, Row]] = field(default_factory=list)
+    _numbers: defaultdict[str, dict[Row, int]] = field(default_factory=lambda: defaultdict(dict))
+
+    def of(self, predicate: str) -> Mapping[Row, int]:
+        """The facts of one predicate with their numbers; it grows as facts are mentioned."""
+        return self._numbers[predicate]
+
+    def number(self, predicate: str, row: Row) -> int:
+        """The number of a fact; a new one if it was never mentioned."""
+        numbers = self._numbers[predicate]
+        found = numbers.get(row)
+        if found is None:
+            found = numbers[row] = len(self.facts)
+            self.facts.append((predicate, row))
+        return found
+
+    def text(self, number: int) -> str:
+        """A fact as text."""
+        predicate, row = self.facts[number]
+        return " ".join((predicate, *row))
 
 
 @dataclass(slots=True)
@@ -17,8 +49,8 @@ class Change:
     condition: Condition
     names: Mapping[str, str]
     """What the variables of `condition.further` stand for."""
-    positive: frozenset[int]
-    negative: frozenset[int]
+    literals: Literals
+    """The literals of `condition`."""
     add: frozenset[int]
     delete: frozenset[int]
 
@@ -30,9 +62,8 @@ class Instance:
     action: Action
     row: Row
     """The objects, in the order of the parameters."""
-    positive: frozenset[int]
-    negative: frozenset[int]
-    """Facts that must be false."""
+    literals: Literals
+    """Those of the precondition."""
     add: frozenset[int]
     delete: frozenset[int]
     """Without what it also adds: adding wins."""
@@ -57,8 +88,8 @@ class Derivation:
     rule: DerivedRule
     names: Mapping[str, str]
     head: int
-    positive: frozenset[int]
-    negative: frozenset[int]
+    literals: Literals
+    """Those of the condition."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,21 +10,50 @@ Concise finite-domain representations for PDDL planning tasks (2009).
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.ground.matching import Pattern
-from nondum.planning.ground.relations import Key, Relations, Row
 
 _FEW = 32
 """Up to this number, objects are looked up one by one rather than found among all rows."""
 
+Key: TypeAlias = tuple[str, tuple[int, ...]]
+"""A predicate, and the positions that are looked up."""
 Values: TypeAlias = list[str]
 """A rule's variables, then the constants that it names; by position."""
 Fire: TypeAlias = Callable[[Values], None]
 Domains: TypeAlias = Sequence[frozenset[str]]
 """For each variable the objects that it may stand for."""
+
+
+class Relations:
+    """Rows by predicate and by the values at those positions that are looked up."""
+
+    def __init__(self) -> None:
+        self._rows: defaultdict[str, list[Row]] = defaultdict(list)
+        self._tables: dict[Key, defaultdict[Row, list[Row]]] = {}
+        self._of: defaultdict[str, list[tuple[tuple[int, ...], defaultdict[Row, list[Row]]]]]
+        self._of = defaultdict(list)
+
+    def add(self, predicate: str, row: Row) -> None:
+        """Add a fact that is not there yet."""
+        self._rows[predicate].append(row)
+        for positions, table in self._of[predicate]:
+            table[tuple([row[position] for position in positions])].append(row)
+
+    def table(self, key: Key) -> Mapping[Row, Sequence[Row]]:
+        """Values at the key's positions → rows; it grows as rows are added."""
+        if key not in self._tables:
+            predicate, positions = key
+            table = self._tables[key] = defaultdict(list)
+            for row in self._rows[predicate]:
+                table[tuple([row[position] for position in positions])].append(row)
+            self._of[predicate].append((positions, table))
+        return self._tables[key]
 
 
 class TooMuchWork(Exception):
@@ -45,7 +74,7 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class Query:
     """What a join needs to know."""
 
     variables: Row
@@ -108,26 +137,26 @@ class Join:
     variables that have a value when it is run.
     """
 
-    def __init__(self, rule: Rule, trigger: int | None = None, known: Sequence[str] = ()) -> None:
-        self._constants = rule.constants
-        self._at = {name: i for i, name in enumerate((*rule.variables, *self._constants))}
-        self._size = len(rule.variables)
-        self._checks = [(pair, True) for pair in rule.equal]
-        self._checks += [(pair, False) for pair in rule.unequal]
+    def __init__(self, query: Query, trigger: int | None = None, known: Sequence[str] = ()) -> None:
+        self._constants = query.constants
+        self._at = {name: i for i, name in enumerate((*query.variables, *self._constants))}
+        self._size = len(query.variables)
+        self._checks = [(pair, True) for pair in query.equal]
+        self._checks += [(pair, False) for pair in query.unequal]
         bound = {*self._constants, *known}
         self._first_checks = self._checked(bound)
         self._first: _Step | None = None
-        left = list(rule.patterns)
+        left = list(query.patterns)
         if trigger is not None:
-            self._first = self._step(left.pop(trigger), rule, bound, is_trigger=True)
+            self._first = self._step(left.pop(trigger), query, bound, is_trigger=True)
         self._steps: list[_Step] = []
         while left:
-            best = min(left, key=lambda pattern: _breadth(pattern, rule, bound))
-            if variable := _narrow(best, rule, bound):
+            best = min(left, key=lambda pattern: _breadth(pattern, query, bound))
+            if variable := _narrow(best, query, bound):
                 self._steps.append(self._enumeration(variable, bound))
             left.remove(best)
-            self._steps.append(self._step(best, rule, bound))
-        for variable in rule.variables:
+            self._steps.append(self._step(best, query, bound))
+        for variable in query.variables:
             if variable not in bound:
                 self._steps.append(self._enumeration(variable, bound))
 
@@ -180,7 +209,7 @@ class Join:
                 self._walk(depth + 1, values, run)
 
     def _step(
-        self, pattern: Pattern, rule: Rule, bound: set[str], *, is_trigger: bool = False
+        self, pattern: Pattern, query: Query, bound: set[str], *, is_trigger: bool = False
     ) -> _Step:
         positions: list[int] = []
         new: dict[str, tuple[int, int]] = {}
@@ -211,22 +240,22 @@ class Join:
         return tuple(_Check(self._at[a], self._at[b], is_equal) for (a, b), is_equal in ready)
 
 
-def _breadth(pattern: Pattern, rule: Rule, bound: set[str]) -> float:
+def _breadth(pattern: Pattern, query: Query, bound: set[str]) -> float:
     """A guess at how many rows fit: all objects of the open variables, fewer for each bound one."""
     open_variables = {term for term in pattern.terms if term not in bound}
     if not open_variables:
         return 0.0
-    breadth = math.prod(rule.breadths[variable] for variable in open_variables)
+    breadth = math.prod(query.breadths[variable] for variable in open_variables)
     return breadth / 10.0 ** (len(pattern.terms) - len(open_variables))
 
 
-def _narrow(pattern: Pattern, rule: Rule, bound: set[str]) -> str:
+def _narrow(pattern: Pattern, query: Query, bound: set[str]) -> str:
     """The only variable of a pattern, if trying its objects is quicker than reading all rows."""
     variables = set(pattern.terms)
     if len(variables) != 1 or variables <= bound:
         return ""
     (variable,) = variables
-    return variable if rule.breadths[variable] <= _FEW else ""
+    return variable if query.breadths[variable] <= _FEW else ""
 
 
 def _rows_among(step: _Step, values: Values, run: _Run) -> Sequence[Row]:

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.ground.members import domains_of, members_of
-from nondum.planning.ground.relations import Row
 from nondum.planning.ground.static import Names, value_of
 from nondum.planning.merge.derivation import strata_of
 from nondum.planning.merge.domain import Action, Merged

@@ -5,62 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from nondum.planning.ground.bounds import INSTANCES_LIMIT, work_for
+from nondum.planning.ground.bounds import INSTANCES_LIMIT, Spending, work_for
 from nondum.planning.ground.delete_relaxation import reachable_part
-from nondum.planning.ground.expansion import Disjunction, Expander
-from nondum.planning.ground.instances import Change, Exploration, Instance
-from nondum.planning.ground.work_limit import Spending
+from nondum.planning.ground.expansion import Expander
+from nondum.planning.ground.instances import Change, Exploration, Instance, Literals
 from nondum.planning.merge.derivation import strata_of
 from nondum.planning.merge.domain import Merged, bind
 from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.facts import parts
-from nondum.planning.pddl.literals import Literals
 from nondum.planning.pddl.syntax import Atom, Equal
+from nondum.sdk.planner import ConditionalEffect, GroundAction, Layer, Rule
 
 GOAL = "goal"
 """What stands for a goal that is a disjunction."""
 
 
 @dataclass(frozen=True, slots=True)
-class LiteralChange:
-    """What changes where a condition holds."""
-
-    condition: Literals
-    add: frozenset[int]
-    delete: frozenset[int]
-
-
-@dataclass(frozen=True, slots=True)
-class LiteralAction:
-    """A ground action; a disjunctive precondition makes several of one name."""
-
-    name: str
-    condition: Literals
-    add: frozenset[int]
-    delete: frozenset[int]
-    changes: tuple[LiteralChange, ...]
-    cost: int
-
-
-@dataclass(frozen=True, slots=True)
-class LiteralRule:
-    """A derived fact and one way in which it holds."""
-
-    head: int
-    body: Literals
-    layer: int
-
-
-@dataclass(frozen=True, slots=True)
 class LiteralTask:
-    """A task in numbers of facts."""
+    """A task like a ground task, but for what must be false: where a condition of it has `~number`,
+    the fact of that number must not hold. Its layers have no complements."""
 
-    actions: tuple[LiteralAction, ...]
-    rules: tuple[LiteralRule, ...]
-    layers: int
-    """How many layers of rules there are."""
+    init: frozenset[int]
     goal: Literals
-    believed: frozenset[int]
+    actions: tuple[GroundAction, ...]
+    derived: tuple[Layer, ...]
 
 
 def expanded(
@@ -82,15 +50,14 @@ class _Expansion:
         self._groups = strata_of(merged.domain.derived).groups
 
     def literal_task(self, goal: GoalExpr) -> LiteralTask:
-        rules = list(self._rules())
-        rules += self._rules_of_disjunctions(len(self._groups))
+        layers = self._layers()
         actions = [
             action for instance in self._found.instances for action in self._actions(instance)
         ]
         wanted = self._goal(goal)
-        rules += self._rules_of_disjunctions(len(self._groups))
+        layers.append(list(self._expander.new_rules()))
         literal_task = LiteralTask(
-            tuple(actions), tuple(rules), len(self._groups) + 1, wanted, self._found.believed
+            self._found.believed, wanted, tuple(actions), tuple(Layer(tuple(r)) for r in layers)
         )
         return reachable_part(literal_task) if self._was_expanded(goal) else literal_task
 
@@ -102,50 +69,41 @@ class _Expansion:
             conditions += (action.precondition, *(c.condition for c in action.effect.conditional))
         return any(condition.further for condition in conditions)
 
-    def _rules(self) -> Iterator[LiteralRule]:
+    def _layers(self) -> list[list[Rule]]:
         layer = {name: index for index, group in enumerate(self._groups) for name in group}
+        layers: list[list[Rule]] = [[] for _ in self._groups]
         for derivation in sorted(
             self._found.derivations, key=lambda d: (d.head, *d.names.values())
         ):
             rule = derivation.rule
-            literals = Literals(derivation.positive, derivation.negative)
             further, names = rule.condition.further, derivation.names
             with self._spending.by(rule.head.predicate, rule.origins):
-                bodies = self._expander.alternatives(literals, further, names)
-            number = layer[rule.head.predicate]
-            yield from (LiteralRule(derivation.head, body, number) for body in bodies)
-            yield from self._rules_of_disjunctions(number)
+                bodies = self._expander.alternatives(derivation.literals, further, names)
+            rules = layers[layer[rule.head.predicate]]
+            rules += (Rule(derivation.head, body) for body in bodies)
+            rules += self._expander.new_rules()
+        return layers
 
-    def _rules_of_disjunctions(self, layer: int) -> Iterator[LiteralRule]:
-        """The rules of the facts that were made since last time."""
-        made: list[Disjunction] = list(self._expander.disjunctions)
-        self._expander.disjunctions.clear()
-        for disjunction in made:
-            yield from (LiteralRule(disjunction.fact, body, layer) for body in disjunction.bodies)
-
-    def _actions(self, instance: Instance) -> Iterator[LiteralAction]:
+    def _actions(self, instance: Instance) -> Iterator[GroundAction]:
         cost = self._cost(instance)
         if cost is None:
             return
         action = instance.action
         with self._spending.by(action.name, action.origins):
             always, changes = _sorted_out(self._changes(instance.changes))
-            literals = Literals(instance.positive, instance.negative)
             further = action.precondition.further
-            conditions = self._expander.alternatives(literals, further, instance.names)
+            conditions = self._expander.alternatives(instance.literals, further, instance.names)
         add = instance.add.union(*(change.add for change in always))
         delete = instance.delete.union(*(change.delete for change in always)) - add
+        conditional = tuple(_net(changes, add, delete))
         for condition in conditions:
-            yield LiteralAction(
-                instance.name, condition, add, delete, tuple(_net(changes, add, delete)), cost
-            )
+            yield GroundAction(instance.name, condition, add, delete, cost, conditional)
 
-    def _changes(self, changes: Iterable[Change]) -> Iterator[LiteralChange]:
+    def _changes(self, changes: Iterable[Change]) -> Iterator[ConditionalEffect]:
         for change in changes:
-            literals = Literals(change.positive, change.negative)
             further = change.condition.further
-            for condition in self._expander.alternatives(literals, further, change.names):
-                yield LiteralChange(condition, change.add, change.delete)
+            for condition in self._expander.alternatives(change.literals, further, change.names):
+                yield ConditionalEffect(condition, change.add, change.delete)
 
     def _cost(self, instance: Instance) -> int | None:
         """None where a function that it adds has no value: then it cannot be taken (PDDL 2.1)."""
@@ -161,9 +119,12 @@ class _Expansion:
         """Equal objects that differ, or different ones that do not, ask for what nothing gives."""
         wrong = [pair for pair in goal.equal if pair.left != pair.right]
         wrong += [pair for pair in goal.unequal if pair.left == pair.right]
-        literals = Literals(
-            frozenset(map(self._number, goal.positive)) | frozenset(map(self._pair, wrong)),
-            frozenset(map(self._number, goal.negative)),
+        literals = frozenset(
+            (
+                *map(self._number, goal.positive),
+                *map(self._pair, wrong),
+                *(~self._number(atom) for atom in goal.negative),
+            )
         )
         if not goal.further:
             return literals
@@ -189,17 +150,17 @@ def stands_for_goal(text: str) -> bool:
 
 
 def _sorted_out(
-    changes: Iterable[LiteralChange],
-) -> tuple[Sequence[LiteralChange], Sequence[LiteralChange]]:
+    changes: Iterable[ConditionalEffect],
+) -> tuple[Sequence[ConditionalEffect], Sequence[ConditionalEffect]]:
     """Those that happen always, and those that happen where a condition holds."""
     found = list(dict.fromkeys(changes))
-    always = [change for change in found if change.condition == Literals()]
-    return always, [change for change in found if change.condition != Literals()]
+    always = [change for change in found if not change.condition]
+    return always, [change for change in found if change.condition]
 
 
 def _net(
-    changes: Iterable[LiteralChange], add: frozenset[int], delete: frozenset[int]
-) -> Iterator[LiteralChange]:
+    changes: Iterable[ConditionalEffect], add: frozenset[int], delete: frozenset[int]
+) -> Iterator[ConditionalEffect]:
     """What the conditional changes do beside the unconditional ones."""
     merged: dict[Literals, tuple[frozenset[int], frozenset[int]]] = {}
     for change in changes:
@@ -209,4 +170,4 @@ def _net(
         mine = added - add
         others = deleted - added - add - delete
         if mine or others:
-            yield LiteralChange(condition, mine, others)
+            yield ConditionalEffect(condition, mine, others)

@@ -7,30 +7,30 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.pddl.syntax import Atom
 
-Tuple: TypeAlias = tuple[str, ...]
 Binding: TypeAlias = dict[str, str]
 
 
 @dataclass(slots=True)
-class Relations:
+class FactIndex:
     """Facts by predicate, and by predicate, position and object."""
 
-    rows: defaultdict[str, list[Tuple]] = field(default_factory=lambda: defaultdict(list))
-    index: defaultdict[tuple[str, int, str], list[Tuple]] = field(
+    rows: defaultdict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
+    index: defaultdict[tuple[str, int, str], list[Row]] = field(
         default_factory=lambda: defaultdict(list)
     )
 
-    def add(self, predicate: str, arguments: Tuple) -> None:
+    def add(self, predicate: str, arguments: Row) -> None:
         """Add a fact that is not there yet."""
         self.rows[predicate].append(arguments)
         for position, argument in enumerate(arguments):
             self.index[predicate, position, argument].append(arguments)
 
-    def candidates(self, pattern: Pattern, binding: Mapping[str, str]) -> Sequence[Tuple]:
+    def candidates(self, pattern: Pattern, binding: Mapping[str, str]) -> Sequence[Row]:
         """The smallest list of facts that contains all that fit the pattern."""
-        found: Sequence[Tuple] = self.rows[pattern.predicate]
+        found: Sequence[Row] = self.rows[pattern.predicate]
         for position, term in enumerate(pattern.terms):
             value = binding.get(term) if term[0] == "?" else term
             if value is not None:
@@ -45,7 +45,7 @@ class Pattern:
     """A condition `(predicate term …)`; terms with `?` are variables."""
 
     predicate: str
-    terms: Tuple
+    terms: Row
 
     @classmethod
     def of(cls, atom: Atom) -> Pattern:
@@ -54,7 +54,7 @@ class Pattern:
 
 
 def matched(
-    pattern: Pattern, arguments: Tuple, binding: Binding, domains: Mapping[str, frozenset[str]]
+    pattern: Pattern, arguments: Row, binding: Binding, domains: Mapping[str, frozenset[str]]
 ) -> Binding | None:
     """The binding extended so that the pattern becomes the fact; None if it cannot."""
     extended = binding

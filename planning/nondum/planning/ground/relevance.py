@@ -3,88 +3,75 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TypeAlias
 
-from nondum.planning.ground.literal_task import LiteralAction, LiteralRule, LiteralTask
-from nondum.planning.pddl.literals import Literals
-
-Literal: TypeAlias = tuple[int, bool]
-"""A fact, and whether it is to be true."""
+from nondum.planning.ground.instances import Literals
+from nondum.planning.ground.literal_task import LiteralTask
+from nondum.sdk.planner import ConditionalEffect, GroundAction, Layer, Rule
 
 
-def helpful(literal_task: LiteralTask) -> LiteralTask:
+def helpful(task: LiteralTask) -> LiteralTask:
     """The task without actions and rules that give nothing which anything else asks for.
 
     Of an effect that may undo something asked for, it is asked that its condition does not hold.
     """
-    givers: defaultdict[Literal, list[int]] = defaultdict(list)
-    for index, action in enumerate(literal_task.actions):
+    givers: defaultdict[int, list[int]] = defaultdict(list)
+    for index, action in enumerate(task.actions):
         for literal in _given(action):
             givers[literal].append(index)
-    rules: defaultdict[int, list[LiteralRule]] = defaultdict(list)
-    for rule in literal_task.rules:
+    rules: defaultdict[int, list[Rule]] = defaultdict(list)
+    for rule in (rule for layer in task.derived for rule in layer.rules):
         rules[rule.head].append(rule)
-    waiting = list(_literals(literal_task.goal))
+    waiting = list(task.goal)
     asked = set(waiting)
     kept: set[int] = set()
 
-    def ask(literals: Iterator[Literal]) -> None:
-        for literal in literals:
-            if literal not in asked:
-                asked.add(literal)
-                waiting.append(literal)
+    def ask(literals: Iterable[int]) -> None:
+        new = [literal for literal in literals if literal not in asked]
+        asked.update(new)
+        waiting.extend(new)
 
     while waiting:
-        fact, is_true = literal = waiting.pop()
-        for rule in rules.get(fact, ()):
-            ask(_literals(rule.body if is_true else _opposite(rule.body)))
+        literal = waiting.pop()
+        for rule in rules.get(_fact(literal), ()):
+            ask(rule.body if literal >= 0 else _opposites(rule.body))
         for index in givers.get(literal, ()):
-            action = literal_task.actions[index]
+            action = task.actions[index]
             if index not in kept:
                 kept.add(index)
-                ask(_literals(action.condition))
-            ask(_asked_by_changes(action, literal))
-        for index in givers.get((fact, not is_true), ()):
-            ask(_asked_against(literal_task.actions[index], (fact, not is_true)))
-    asked_facts = {fact for fact, _ in asked}
-    actions = (literal_task.actions[index] for index in sorted(kept))
+                ask(action.precondition)
+            for change in _giving(action, literal):
+                ask(change.condition)
+        for index in givers.get(~literal, ()):
+            for change in _giving(task.actions[index], ~literal):
+                ask(_opposites(change.condition))
+    facts = frozenset(map(_fact, asked))
     return replace(
-        literal_task,
-        actions=tuple(actions),
-        rules=tuple(rule for rule in literal_task.rules if rule.head in asked_facts),
+        task,
+        actions=tuple(task.actions[index] for index in sorted(kept)),
+        derived=tuple(
+            Layer(tuple(rule for rule in layer.rules if rule.head in facts))
+            for layer in task.derived
+        ),
     )
 
 
-def _literals(literals: Literals) -> Iterator[Literal]:
-    yield from ((fact, True) for fact in literals.positive)
-    yield from ((fact, False) for fact in literals.negative)
+def _fact(literal: int) -> int:
+    return max(literal, ~literal)
 
 
-def _opposite(literals: Literals) -> Literals:
-    return Literals(literals.negative, literals.positive)
+def _opposites(literals: Literals) -> Iterator[int]:
+    return (~literal for literal in literals)
 
 
-def _given(action: LiteralAction) -> set[Literal]:
-    literals = {(fact, True) for fact in action.add} | {(fact, False) for fact in action.delete}
-    for change in action.changes:
-        literals |= {(fact, True) for fact in change.add}
-        literals |= {(fact, False) for fact in change.delete}
-    return literals
+def _given(action: GroundAction) -> frozenset[int]:
+    literals = action.add.union(_opposites(action.delete), *(c.add for c in action.conditional))
+    return literals.union(*(_opposites(change.delete) for change in action.conditional))
 
 
-def _asked_by_changes(action: LiteralAction, literal: Literal) -> Iterator[Literal]:
-    """What the changes that give a literal ask for."""
-    fact, is_true = literal
-    for change in action.changes:
-        if fact in (change.add if is_true else change.delete):
-            yield from _literals(change.condition)
-
-
-def _asked_against(action: LiteralAction, harm: Literal) -> Iterator[Literal]:
-    """What keeps the changes that would undo something from happening."""
-    fact, is_true = harm
-    for change in action.changes:
-        if fact in (change.add if is_true else change.delete):
-            yield from _literals(_opposite(change.condition))
+def _giving(action: GroundAction, literal: int) -> Iterator[ConditionalEffect]:
+    """The conditional effects that make a literal true."""
+    for change in action.conditional:
+        if literal in change.add or ~literal in change.delete:
+            yield change

@@ -7,9 +7,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from nondum.planning.ground.relations import Row
+from nondum.planning.ground.instances import Row
 from nondum.planning.merge.domain import Action, DerivedRule, Merged, functional_predicates
 from nondum.planning.merge.goal import GoalExpr
+from nondum.planning.pddl.facts import predicate_of
 from nondum.planning.pddl.normal import Condition, atoms_in, quantified_in
 from nondum.planning.pddl.syntax import Atom, Term
 
@@ -29,10 +30,10 @@ class RelevantPart:
     """Only the schemas that give what the goal, or another of them, asks for."""
     wishes: Wishes
 
-    @property
-    def read(self) -> frozenset[str]:
-        """The predicates that are asked for: facts of others do not matter."""
-        return self.wishes.read
+    def known(self, facts: Iterable[str]) -> tuple[str, ...]:
+        """Those of the facts that are asked about: others do not matter."""
+        read = self.wishes.read
+        return tuple(text for text in facts if predicate_of(text) in read)
 
 
 class Wishes:
@@ -43,7 +44,7 @@ class Wishes:
 
     @property
     def read(self) -> frozenset[str]:
-        """The predicates that are asked for: facts of others do not matter."""
+        """The predicates that are asked for."""
         return frozenset(predicate for predicate, _ in self._patterns)
 
     def new(self, wishes: Iterable[Wish]) -> Iterator[Wish]:

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
+from nondum.planning.ground.instances import Row
 from nondum.planning.ground.join import Work
-from nondum.planning.ground.relations import Row
+from nondum.planning.ground.members import domains_of
 from nondum.planning.pddl.syntax import (
     And,
     Atom,
@@ -18,9 +19,7 @@ from nondum.planning.pddl.syntax import (
     Or,
     Quantified,
     Term,
-    TypedName,
 )
-from nondum.planning.pddl.typegraph import ROOT
 
 _WORK_OF_BINDING = 3
 """What looking at one binding of a quantifier counts as."""
@@ -36,7 +35,7 @@ class StaticFacts:
     """Predicate → its facts."""
     written: frozenset[str]
     """The predicates that something writes: of these it knows nothing."""
-    domains: Mapping[str, frozenset[str]]
+    members: Mapping[str, frozenset[str]]
     """Type → the objects of it."""
     work: Work
     """What deciding quantifiers may take."""
@@ -70,22 +69,16 @@ class StaticFacts:
         return row in self.rows.get(atom.predicate, ())
 
     def _bindings(self, formula: Quantified, names: Names) -> Iterator[Names]:
-        domains = [sorted(self.objects(variable)) for variable in formula.variables]
-        for values in product(*domains):
+        domains = domains_of(formula.variables, self.members)
+        for values in product(*map(sorted, domains.values())):
             self.work.spend(_WORK_OF_BINDING)
-            own = {v.name: value for v, value in zip(formula.variables, values, strict=True)}
-            yield {**names, **own}
-
-    def objects(self, variable: TypedName) -> frozenset[str]:
-        """What a variable may stand for."""
-        types = variable.types or (ROOT,)
-        return frozenset().union(*(self.domains.get(name, frozenset()) for name in types))
+            yield {**names, **dict(zip(domains, values, strict=True))}
 
 
 def static_facts(
     believed: Iterable[tuple[str, Row]],
     written: frozenset[str],
-    domains: Mapping[str, frozenset[str]],
+    members: Mapping[str, frozenset[str]],
     work: Work,
 ) -> StaticFacts:
     """Those of the believed facts that nothing writes."""
@@ -94,7 +87,7 @@ def static_facts(
         if predicate not in written:
             rows[predicate].add(row)
     found = {name: frozenset(those) for name, those in rows.items()}
-    return StaticFacts(found, written, domains, work)
+    return StaticFacts(found, written, members, work)
 
 
 def value_of(term: Term, names: Names) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from nondum.planning.merge.domain import Merged, Origin
@@ -39,17 +40,26 @@ class Goal:
         return f"{self.kind} {goal_text(self.expr)}"
 
 
+@lru_cache(maxsize=1024)
+def read_goal(text: str) -> GoalExpr:
+    """The condition that a text in PDDL says, whatever its words mean; each text is parsed once.
+
+    Raises `GoalRefused`: PDDL_UNSUPPORTED, those of syntax.
+    """
+    try:
+        return condition_of(parse_formula(text, FILE))
+    except FragmentRefused as refused:
+        raise GoalRefused(*refused.problems) from refused
+    except Misplaced as wrong:
+        raise GoalRefused(wrong.problem(text)) from wrong
+
+
 def parse_goal(text: str, merged: Merged, *, kind: GoalKind = "achieve") -> Goal:
     """Read a goal written in PDDL: `(pointing self radiation-source)`.
 
     Raises `GoalRefused`: PDDL_UNKNOWN, PDDL_TYPE, PDDL_ARITY, PDDL_UNSUPPORTED, those of syntax.
     """
-    try:
-        condition = condition_of(parse_formula(text, FILE))
-    except FragmentRefused as refused:
-        raise GoalRefused(*refused.problems) from refused
-    except Misplaced as wrong:
-        raise GoalRefused(wrong.problem(text)) from wrong
+    condition = read_goal(text)
     problems = condition_problems(condition, text, merged)
     if problems:
         raise GoalRefused(*problems)
@@ -57,9 +67,8 @@ def parse_goal(text: str, merged: Merged, *, kind: GoalKind = "achieve") -> Goal
 
 
 def goal_problems(goal: Goal, merged: Merged) -> tuple[Problem, ...]:
-    """What keeps a goal from being asked for now: names that have gone since it was given."""
-    text = goal_text(goal.expr)
-    return condition_problems(condition_of(parse_formula(text, FILE)), text, merged)
+    """What keeps a goal in PDDL from being asked for now: names gone since it was given."""
+    return condition_problems(goal.expr, goal.text, merged)
 
 
 def goal_text(expr: GoalExpr) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from nondum.planning.ground.delete_relaxation import reachable_facts
 from nondum.planning.search.derivation import MaskLayer, Stage, stages_of
 from nondum.sdk.planner import GroundAction, GroundTask
 
@@ -69,19 +68,19 @@ class Encoded:
         return reached
 
 
-def encode(task: GroundTask) -> Encoded:
+def encode(task: GroundTask, reached: frozenset[int]) -> Encoded:
     """Leave out facts that are true for ever, facts that nothing asks for, and actions that cannot
     be reached, change nothing, or do the same as a cheaper one.
 
-    The goal must be in reach when deletes are ignored.
+    `reached` are its `reachable_facts`; the goal must be among them.
     """
-    return _Encoder(task).encoded()
+    return _Encoder(task, reached).encoded()
 
 
 class _Encoder:
-    def __init__(self, task: GroundTask) -> None:
+    def __init__(self, task: GroundTask, reached: frozenset[int]) -> None:
         self._task = task
-        self._reached = reached = reachable_facts(task)
+        self._reached = reached
         self._actions = [(i, a) for i, a in enumerate(task.actions) if a.precondition <= reached]
         self._rules = [[r for r in layer.rules if r.body <= reached] for layer in task.derived]
         pairs = [pair for layer in task.derived for pair in layer.complements]

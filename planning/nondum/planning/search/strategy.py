@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from nondum.planning.ground.delete_relaxation import quick_answer
+from nondum.planning.ground.delete_relaxation import quick_answer, reachable_facts
 from nondum.planning.search.changes import Changes
 from nondum.planning.search.encoding import Encoded, encode
 from nondum.planning.search.greedy import Greedy
@@ -34,9 +34,10 @@ def solve(task: GroundTask, is_over: IsOver) -> Answer:
 
     The answer does not depend on the clock, unless it is that time ran out.
     """
-    if (known := quick_answer(task)) is not None:
+    reached = reachable_facts(task)
+    if (known := quick_answer(task, reached)) is not None:
         return known
-    encoded = encode(task)
+    encoded = encode(task, reached)
     changes = Changes(encoded)
     found = _searched(encoded, changes, is_over)
     match found:

@@ -8,11 +8,9 @@ from typing import cast, get_args
 
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.domain import Action, Merged
-from nondum.planning.merge.goal import FILE, GoalKind, condition_problems
+from nondum.planning.merge.goal import GoalKind, condition_problems, read_goal
 from nondum.planning.merge.scope import SELF
-from nondum.planning.pddl.caret import Misplaced
-from nondum.planning.pddl.normal import Condition, condition_of
-from nondum.planning.pddl.parse import parse_formula
+from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import Term, TypedName
 from nondum.planning.words.pattern import (
     Optional,
@@ -23,7 +21,7 @@ from nondum.planning.words.pattern import (
     slots_of,
 )
 from nondum.sdk.description import Phrase
-from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.errors import GoalRefused, Problem
 
 MAX_SLOTS = 3
 MAX_OPTIONAL_PARTS = 4
@@ -129,11 +127,9 @@ def _is_said(term: Term, names: Mapping[str, str]) -> bool:
 def _condition(phrase: Phrase, parts: tuple[Part, ...], merged: Merged) -> Condition:
     types = {f"?{slot.name}": slot.types for slot in slots_of(parts) if not slot.is_free}
     try:
-        condition = condition_of(parse_formula(phrase.goal, FILE))
-    except FragmentRefused as refused:
+        condition = read_goal(phrase.goal)
+    except GoalRefused as refused:
         raise PatternInvalid(str(refused)) from refused
-    except Misplaced as wrong:
-        raise PatternInvalid(str(wrong.problem(phrase.goal))) from wrong
     problems = condition_problems(condition, phrase.goal, merged, types)
     if problems:
         raise PatternInvalid("; ".join(map(str, problems)))

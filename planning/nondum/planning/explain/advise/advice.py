@@ -10,11 +10,7 @@ from nondum.planning.explain.advise.minimal import Enumeration
 from nondum.planning.explain.advise.relevance import relevant
 from nondum.planning.explain.advise.trial import Chosen, Outcome, Trial, Trials
 from nondum.planning.explain.conflict import Search
-from nondum.planning.merge.goal import FILE
-from nondum.planning.pddl.caret import Misplaced
-from nondum.planning.pddl.normal import Condition, condition_of
-from nondum.planning.pddl.parse import parse_formula
-from nondum.sdk.errors import FragmentRefused, GoalRefused
+from nondum.planning.merge.goal import read_goal
 from nondum.sdk.planner import GroundTask, Plan
 
 WAYS_LIMIT = 20
@@ -77,7 +73,7 @@ def advise(
     now = Trials(here, goal, (), search).of(frozenset())
     if now.outcome is Outcome.POSSIBLE:
         return Advice(_way((), now))
-    known = relevant(here.contributions, _condition(goal), tuple(candidates))
+    known = relevant(here.contributions, read_goal(goal), tuple(candidates))
     fit, unfit = _sifted(here, goal, known, search)
     trials = Trials(here, goal, fit, search)
     sets = Enumeration(trials, ways_limit, trials_limit)
@@ -87,15 +83,6 @@ def advise(
     for number, problem in sorted(sets.oversized.items()):
         unfit.append(replace(fit[number], caveats=(*fit[number].caveats, problem)))
     return Advice(None, tuple(ways), sets.is_complete, len(known), tuple(unfit))
-
-
-def _condition(goal: str) -> Condition:
-    try:
-        return condition_of(parse_formula(goal, FILE))
-    except FragmentRefused as refused:
-        raise GoalRefused(*refused.problems) from refused
-    except Misplaced as wrong:
-        raise GoalRefused(wrong.problem(goal)) from wrong
 
 
 def _sifted(
