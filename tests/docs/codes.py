@@ -19,6 +19,7 @@ TABLE = "plugins/sdk/nondum/sdk/codes"
 FOLDERS = (
     "host/nondum",
     "planning/nondum",
+    "plugins/host-zenoh/nondum_host_zenoh",
     "plugins/sdk/nondum",
     "transport/nondum",
     "wheelhouse/nondum",

@@ -13,8 +13,8 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[2]
 LOCK = ROOT / "packaging/debian/requirements.lock"
 BACKEND_LOCK = ROOT / "packaging/debian/backend.lock"
-DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
-OWN = {"nondum", "nondum-sdk", "nondum-planner-pyperplan"}
+DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/host-zenoh", "plugins/planner-pyperplan")
+OWN = {"nondum", "nondum-sdk", "nondum-host-zenoh", "nondum-planner-pyperplan"}
 
 
 def test_lock_satisfies_what_is_declared() -> None:

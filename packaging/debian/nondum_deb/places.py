@@ -11,7 +11,7 @@ DEBIAN = PACKAGING / "debian"
 LOCK = DEBIAN / "requirements.lock"
 BACKEND_LOCK = DEBIAN / "backend.lock"
 """What builds the wheels of the checkout."""
-DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/planner-pyperplan")
+DISTRIBUTIONS = ("plugins/sdk", ".", "plugins/host-zenoh", "plugins/planner-pyperplan")
 """Of the checkout, what is in the package. pyperplan is a separate distribution, as the DESIGN asks
 of every package: it is under the GPL."""
 EXTRAS = {"nondum": ("fast", "usb")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 import types
 from collections.abc import Callable
@@ -55,6 +56,7 @@ def test_what_ships_is_made_of_extensions(tmp_path: Path) -> None:
     assert "native" in dict(shipped.asked("planners"))
     outputs = [*shipped.asked("feedback_outputs", host=host(tmp_path, HOOK))]
     assert [type(output) for output in outputs] == [Hook]
+    assert list(dict(shipped.asked("fleets", config=HostConfig()))) == ["mesh"]
 
 
 HOOK = '[feedback]\nhook = ["/bin/true"]\nspeak = false\n'
@@ -66,16 +68,18 @@ def test_extension_adds_to_what_ships(module: Callable[..., EntryPoint]) -> None
     assert not extensions.problems
 
 
-@pytest.mark.parametrize("hook", ["planners", "feedback_outputs", "listeners"])
+@pytest.mark.parametrize("hook", hookspecs.HOOKS)
 def test_extension_that_raises_is_told_and_left_out(
     hook: str, module: Callable[..., EntryPoint], tmp_path: Path
 ) -> None:
-    def with_host(host: Host) -> None:
+    def mistaken() -> None:
         raise ZeroDivisionError("a mistake")
 
-    functions = {hook: hookimpl(with_host if hook != "planners" else lambda: 1 // 0)}
-    extensions = Extensions([module("broken", **functions)])
-    arguments = {} if hook == "planners" else {"host": host(tmp_path)}
+    extensions = Extensions([module("broken", **{hook: hookimpl(mistaken)})])
+    every = {"host": host(tmp_path), "config": HostConfig()}
+    arguments = {
+        name: every[name] for name in inspect.signature(getattr(hookspecs, hook)).parameters
+    }
     shipped = [*Extensions([]).asked(hook, **arguments)]
     assert len([*extensions.asked(hook, **arguments)]) == len(shipped)
     assert [(p.code, p.where) for p in extensions.problems] == [("EXTENSION_BROKEN", "broken")]
