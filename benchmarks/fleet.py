@@ -37,9 +37,9 @@ from benchmarks import measuring
 from benchmarks.measuring import Spread
 
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
-from nondum.transport.fleet.zenoh import ZenohFleet
-from nondum.transport.fleet.zenoh_line import RouterAccess
 from nondum.transport.peers import HostKeys, Identity, IncomingCall, Lease, PeerKey, PeerLost, Trust
+from nondum_host_zenoh.fleet import ZenohFleet
+from nondum_host_zenoh.line import RouterAccess
 
 CATALOGUE = {f"component/{number}": {"text": "x" * 970} for number in range(10)}
 NEWS = {"component/9": {"text": "y" * 200}}

@@ -16,6 +16,7 @@ ROOT = Path(__file__).parent.parent
 FOLDERS = (
     "host/nondum",
     "planning/nondum",
+    "plugins/host-zenoh/nondum_host_zenoh",
     "plugins/sdk/nondum",
     "transport/nondum",
     "wheelhouse/nondum",

@@ -13,6 +13,7 @@ PORTIONS = (
     "planning/nondum",
     "transport/nondum",
     "wheelhouse/nondum",
+    "plugins/host-zenoh",
     "plugins/sdk/nondum",
 )
 """The source of nondum itself."""

@@ -20,6 +20,7 @@ FOLDERS = (
     "host/nondum",
     "planning/nondum",
     "plugins/host-lamps/nondum_host_lamps",
+    "plugins/host-zenoh/nondum_host_zenoh",
     "plugins/lab/nondum_lab",
     "plugins/pddl-workbench/nondum_pddl_workbench",
     "plugins/sdk/nondum",

@@ -99,9 +99,8 @@ def hook_signatures() -> str:
             *(_hook(hooks, name) for name in hooks.ACTING),
             "## Hooks for extensions of the host\n",
             *(_hook(hookspecs, name) for name in hookspecs.HOOKS),
-            f"What `host` is: {inspect.getdoc(hookspecs.Host)}\n",
-            *(f"- `host.{name}`: {text}" for name, text in _host_fields()),
-            "",
+            *_fields("host", hookspecs.Host),
+            *_fields("member", hookspecs.FleetMember),
         ]
     )
 
@@ -148,9 +147,11 @@ def _shown(default: Any) -> str:
             return f"`{as_toml(default)}`"
 
 
-def _host_fields() -> Iterator[tuple[str, str]]:
-    docs = field_docs(hookspecs.Host)
-    return ((field.name, " ".join(docs[field.name].split())) for field in fields(hookspecs.Host))
+def _fields(name: str, kind: type[Any]) -> Iterator[str]:
+    docs = field_docs(kind)
+    yield f"What `{name}` is: {inspect.getdoc(kind)}\n"
+    yield from (f"- `{name}.{field.name}`: {docs[field.name]}" for field in fields(kind))
+    yield ""
 
 
 def _hook(module: ModuleType, name: str) -> str:

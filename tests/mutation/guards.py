@@ -33,6 +33,7 @@ _CONTROL = (f"{_TH}/control/test_arguments.py", f"{_TH}/control/test_control.py"
 _HELPER = (f"{_TH}/sandbox/helper/test_server.py",)
 _GRANTS = tuple(f"{_TT}/streams/test_{each}.py" for each in ("packets", "grants", "lying_owners"))
 _TELLERS = tuple(f"{_TT}/fleet/test_{each}.py" for each in ("bad_tellers", "dialling", "fleets"))
+_HZ = "plugins/host-zenoh/nondum_host_zenoh"
 _ZENOH = (f"{_TT}/fleet/test_zenoh.py",)
 _OWNERS = (f"{_TH}/peers/streams/test_hostile_owner.py", f"{_TH}/peers/streams/test_bridge.py")
 _STREAMS = (f"{_TH}/peers/streams/test_remote_streams.py",)
@@ -211,8 +212,8 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_T}/fleet/ledger.py": (f"{_TT}/fleet/test_ledger.py",),
     f"{_T}/fleet/mesh.py": (f"{_TT}/fleet/test_dialling.py",),
     f"{_T}/fleet/replica.py": (f"{_TT}/fleet/test_replica.py",),
-    f"{_T}/fleet/zenoh_line.py": _ZENOH,
-    f"{_T}/fleet/zenoh_node.py": _ZENOH,
+    f"{_HZ}/line.py": _ZENOH,
+    f"{_HZ}/node.py": _ZENOH,
     f"{_T}/streams/exporter.py": _GRANTS,
     f"{_T}/streams/incoming.py": _GRANTS,
     f"{_T}/peers/dialled.py": ("tests/transport/peers/test_descriptors.py",),
@@ -289,6 +290,7 @@ FOLDERS = (
     f"{_H}/workers",
     f"{_T}/discovery",
     f"{_T}/fleet",
+    _HZ,
     f"{_T}/streams",
     f"{_T}/peers",
     f"{_H}/peers/streams",
@@ -368,6 +370,7 @@ ASIDE: Mapping[str, str] = {
     f"{_H}/peers/name_conflicts.py": "says what people are told; `peer_table` refuses",
     f"{_T}/peers/pairing_problems.py": "says what people are told; `pairing_channel` refuses",
     f"{_H}/peers/finder.py": "passes on the addresses that the mesh takes",
+    f"{_H}/peers/fleet_transport.py": "refuses what this host is configured and not equipped for",
     f"{_H}/peers/peering.py": "says that a peer is not there",
     f"{_H}/peers/trust_orders.py": "asks a person of this host which peer is meant",
     f"{_H}/peers/placement/handover.py": _WHOLE,
@@ -409,7 +412,7 @@ SPARED: Mapping[tuple[str, str], str] = {
         "another name is not made of the key either, which is refused below"
     ),
     (
-        f"{_T}/fleet/zenoh_node.py",
+        f"{_HZ}/node.py",
         "self._peer_table.session(peer).notify(Notice(method, args)) is Sent.FULL",
     ): _LIMIT,
     (
@@ -427,7 +430,7 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_T}/peers/certificate.py", "len(data) > MAX_BYTES"): _FORM,
     (f"{_T}/peers/certificate.py", "header != _HEADER"): _FORM,
     (f"{_T}/peers/certificate.py", 'names != (*_FIELDS, "")'): _FORM,
-    (f"{_T}/fleet/zenoh_node.py", "link.session is None and not link.is_over"): (
+    (f"{_HZ}/node.py", "link.session is None and not link.is_over"): (
         "tells of a host that does not answer, which is let in by nothing"
     ),
     (f"{_H}/peers/serving.py", "component is None"): _NO_OFFER,

@@ -15,7 +15,7 @@ from typing import Self
 from tests.mutation.runner import UNTOLD
 from tests.mutation.steps import Step
 
-_PORTIONS = ("host", "planning", "transport", "wheelhouse", "plugins/sdk")
+_PORTIONS = ("host", "planning", "transport", "wheelhouse", "plugins/host-zenoh", "plugins/sdk")
 
 
 def copies(root: Path, folder: Path, count: int) -> list[Copy]:

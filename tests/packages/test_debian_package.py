@@ -93,6 +93,7 @@ def test_own_distributions_and_planners_are_in_it(tree: Tree, architecture: str)
     names = {folder.name.partition("-")[0] for folder in site.glob("*.dist-info")}
     assert {"nondum", "nondum_sdk", "nondum_planner_pyperplan", "pyperplan", "isal"} <= names
     assert {"nondum_host_lamps", "nondum_lab", "nondum_pddl_workbench"} <= names
+    assert {"nondum_host_zenoh", "eclipse_zenoh"} <= names
     assert not list(site.rglob("*.pyc")), "what is compiled is for the machine to make"
     assert not (site / "bin").exists(), "others' programs are not ours to offer"
 

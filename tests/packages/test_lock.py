@@ -14,12 +14,12 @@ ROOT = Path(__file__).parents[2]
 LOCK = ROOT / "packaging/debian/requirements.lock"
 BACKEND_LOCK = ROOT / "packaging/debian/backend.lock"
 DISTRIBUTIONS = (
-    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/lab", "plugins/pddl-workbench"),
-    "plugins/planner-pyperplan",
+    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/host-zenoh", "plugins/lab"),
+    *("plugins/pddl-workbench", "plugins/planner-pyperplan"),
 )
 OWN = {
-    *("nondum", "nondum-sdk", "nondum-host-lamps", "nondum-lab", "nondum-pddl-workbench"),
-    "nondum-planner-pyperplan",
+    *("nondum", "nondum-sdk", "nondum-host-lamps", "nondum-host-zenoh", "nondum-lab"),
+    *("nondum-pddl-workbench", "nondum-planner-pyperplan"),
 }
 
 

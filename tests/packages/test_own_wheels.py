@@ -14,7 +14,7 @@ from tests.packages.checkout import copied
 from tests.packages.conftest import EPOCH, ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300), pytest.mark.short("packages")]
-DISTRIBUTIONS = 6
+DISTRIBUTIONS = 7
 BUILD = """
 import sys
 from pathlib import Path

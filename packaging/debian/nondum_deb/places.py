@@ -12,8 +12,8 @@ LOCK = DEBIAN / "requirements.lock"
 BACKEND_LOCK = DEBIAN / "backend.lock"
 """What builds the wheels of the checkout."""
 DISTRIBUTIONS = (
-    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/lab", "plugins/pddl-workbench"),
-    "plugins/planner-pyperplan",
+    *("plugins/sdk", ".", "plugins/host-lamps", "plugins/host-zenoh", "plugins/lab"),
+    *("plugins/pddl-workbench", "plugins/planner-pyperplan"),
 )
 """Of the checkout, what is in the package. pyperplan is a separate distribution, as the DESIGN asks
 of every package: it is under the GPL."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 import types
 from collections.abc import Callable
@@ -55,6 +56,7 @@ def test_what_ships_is_made_of_extensions(tmp_path: Path) -> None:
     assert "native" in dict(shipped.asked("planners"))
     outputs = [*shipped.asked("feedback_outputs", host=host(tmp_path, HOOK))]
     assert [type(output) for output in outputs] == [Hook]
+    assert list(dict(shipped.asked("fleets", config=HostConfig()))) == ["mesh"]
 
 
 HOOK = '[feedback]\nhook = ["/bin/true"]\nspeak = false\n'
@@ -98,13 +100,14 @@ def test_key_that_lacks_its_extension_is_told(
 def test_extension_that_raises_is_told_and_left_out(
     hook: str, module: Callable[..., EntryPoint], tmp_path: Path
 ) -> None:
-    def with_host(host: Host) -> None:
+    def mistaken() -> None:
         raise ZeroDivisionError("a mistake")
 
-    asks_nothing = hook in ("planners", "config_keys")
-    functions = {hook: hookimpl((lambda: 1 // 0) if asks_nothing else with_host)}
-    extensions = Extensions([module("broken", **functions)])
-    arguments = {} if asks_nothing else {"host": host(tmp_path)}
+    extensions = Extensions([module("broken", **{hook: hookimpl(mistaken)})])
+    every = {"host": host(tmp_path), "config": HostConfig()}
+    arguments = {
+        name: every[name] for name in inspect.signature(getattr(hookspecs, hook)).parameters
+    }
     shipped = [*Extensions([]).asked(hook, **arguments)]
     assert len([*extensions.asked(hook, **arguments)]) == len(shipped)
     assert [(p.code, p.where) for p in extensions.problems] == [("EXTENSION_BROKEN", "broken")]

@@ -22,9 +22,9 @@ from tests.transport.peers.hosts import Servant
 from nondum.sdk.wire import Body
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
 from nondum.transport.fleet.mesh import Find
-from nondum.transport.fleet.zenoh import ZenohFleet
-from nondum.transport.fleet.zenoh_line import RouterAccess
 from nondum.transport.peers import HostKeys, Identity, PeerKey, PeerLost, PeerUp, Refusal, Trust
+from nondum_host_zenoh.fleet import ZenohFleet
+from nondum_host_zenoh.line import RouterAccess
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0

@@ -22,9 +22,6 @@ from tests.transport.fleet.fleets import (
 )
 
 from nondum.transport.fleet import PeerChanged
-from nondum.transport.fleet.zenoh import STATE_S
-from nondum.transport.fleet.zenoh_line import RouterAccess
-from nondum.transport.fleet.zenoh_node import SILENCE_S, TERMS
 from nondum.transport.peers import (
     DialFailed,
     HostKeys,
@@ -37,6 +34,9 @@ from nondum.transport.peers import (
     Trust,
 )
 from nondum.transport.peers.messages import Message, Ping, Pong, Reply, decode
+from nondum_host_zenoh.fleet import STATE_S
+from nondum_host_zenoh.line import RouterAccess
+from nondum_host_zenoh.node import SILENCE_S, TERMS
 
 pytestmark = pytest.mark.anyio
 

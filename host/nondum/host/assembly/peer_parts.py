@@ -32,10 +32,12 @@ async def make_peers(
     """
     if not base.config.peers.enabled:
         return None
+    from nondum.host.peers.fleet_transport import chosen
     from nondum.host.peers.peer_services import PeerServices
 
     return await PeerServices.open(
         base.config,
+        chosen(base.extensions, base.config),
         base.folders,
         workers,
         base.catalogue,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import pluggy
 
@@ -18,11 +18,15 @@ from nondum.host.core.events.event import Emit
 from nondum.host.core.feedback_state import StateReason
 from nondum.host.core.records.snapshot import Snapshot
 
+if TYPE_CHECKING:  # a host without peers loads none of it
+    from nondum.transport.fleet import Find, Fleet, FleetEvent
+    from nondum.transport.peers import Handler, Identity, Trust
+
 PROJECT = "nondum.host"
 """The name of pluggy's project, and of the group of entry points."""
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
-HOOKS = ("planners", "feedback_outputs", "listeners", "config_keys")
+HOOKS = ("planners", "feedback_outputs", "listeners", "fleets", "config_keys")
 
 
 class Output(Protocol):
@@ -61,6 +65,26 @@ class Host:
     """The newest sentences that people were told, the newest last."""
 
 
+@dataclass(frozen=True, slots=True)
+class FleetMember:
+    """What this host brings into a fleet."""
+
+    identity: Identity
+    """Its name and keys."""
+    trust: Trust
+    """Which hosts are let in, to begin with."""
+    handler: Handler
+    """Answers what peers call."""
+    on_event: Callable[[FleetEvent], None]
+    """Is told of peers that come, change and go."""
+    find: Find
+    """Looks for hosts, where these are linked one by one."""
+
+
+MakeFleet: TypeAlias = Callable[[FleetMember], "Fleet"]
+"""Makes the fleet, not started yet, on the running loop. Raises `PeerRefused`."""
+
+
 @hookspec
 def planners() -> Mapping[str, str]:  # type: ignore[empty-body]  # specifications have no body
     """Planners by name: `module:Class`, each runs in a separate process.
@@ -78,6 +102,15 @@ def feedback_outputs(host: Host) -> Iterable[Output]:  # type: ignore[empty-body
 def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a specification
     """Functions that are told every event, on the loop: one that changes the catalogue once that is
     committed or, for progress within a plug, held for the next commit."""
+
+
+@hookspec
+def fleets(config: HostConfig) -> Mapping[str, MakeFleet]:  # type: ignore[empty-body]  # a specification
+    """The ways to reach other hosts that the configuration asks for, by name: what makes a fleet.
+
+    Of all extensions together exactly one must answer with one (FLEET_AMBIGUOUS, ZENOH_MISSING). It
+    is asked only on hosts that have peers.
+    """
 
 
 @hookspec

@@ -17,6 +17,7 @@ from nondum.sdk.errors import Problem
 
 DEFAULT_PLUGINS = (
     "nondum.host.mind.extension",
+    "nondum.host.peers.extension",
     "nondum.host.people.feedback.extension",
     "nondum.host.service.extension",
 )

@@ -1,58 +1,53 @@
-"""By which fleet this host reaches others, as it is configured: links to each, or a router."""
+"""By which fleet this host reaches others: links to each, or what an extension brings."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from nondum.host.config.host_config import HostConfig, PeersSection
-from nondum.host.peers.finder import PeerFinder
+from nondum.host.extension.hookspecs import FleetMember, MakeFleet
+from nondum.host.extension.loading import Extensions
 from nondum.host.peers.links.process import LinksProcess
+from nondum.sdk.errors import Problem
 from nondum.transport.discovery import interfaces as network
-from nondum.transport.fleet import FleetEvent, Mesh
-from nondum.transport.peers import Handler, Identity, LocalSockets, Trust
+from nondum.transport.fleet import Mesh
+from nondum.transport.peers import LocalSockets, PeerRefused
 from nondum.transport.peers.socket_process.sockets import SocketProcess
-
-if TYPE_CHECKING:  # zenoh is an extra
-    from nondum.transport.fleet.zenoh import ZenohFleet
 
 _APART = functools.partial(SocketProcess, start=LinksProcess)
 ON_LOOPBACK = ("tcp://127.0.0.1:0",)
 
 
-def fleet_of(
-    config: HostConfig,
-    identity: Identity,
-    trust: Trust,
-    handler: Handler,
-    *,
-    on_event: Callable[[FleetEvent], None],
-    find: Callable[[Mesh], PeerFinder],
-) -> Mesh | ZenohFleet:
-    """The other hosts, not started yet. Raises `PeerRefused`."""
-    router = config.router
-    if not router.endpoints:
-        return Mesh(
-            identity,
-            trust,
-            handler,
-            on_event=on_event,
-            listen=listens(config.peers),
-            find=find,
-            sockets=_APART if config.peers.process else LocalSockets,
-        )
-    from nondum.transport.fleet.zenoh import ZenohFleet
-    from nondum.transport.fleet.zenoh_line import RouterAccess
-
-    access = RouterAccess(
-        router.fleet,
-        router.endpoints,
-        router.authorities,
-        router.certificate,
-        router.private_key,
+def linked(config: PeersSection, member: FleetMember) -> Mesh:
+    """A link to each other host; not started yet."""
+    return Mesh(
+        member.identity,
+        member.trust,
+        member.handler,
+        on_event=member.on_event,
+        listen=listens(config),
+        find=member.find,
+        sockets=_APART if config.process else LocalSockets,
     )
-    return ZenohFleet(identity, trust, handler, access, on_event=on_event)
+
+
+def chosen(extensions: Extensions, config: HostConfig) -> MakeFleet:
+    """The one way to reach other hosts that extensions have for this configuration.
+
+    Raises `PeerRefused` (FLEET_AMBIGUOUS, ZENOH_MISSING).
+    """
+    found: list[tuple[str, MakeFleet]] = list(extensions.asked("fleets", config=config))
+    if len(found) == 1:
+        return found[0][1]
+    if found:
+        text = "more than one extension would reach this host's peers"
+        have = ", ".join(name for name, _ in found)
+        raise PeerRefused(Problem("FLEET_AMBIGUOUS", text, have=have))
+    text = "a Zenoh router is named, and no extension of this host uses one"
+    fix = "pip install 'nondum[zenoh]'"
+    missing = Problem("ZENOH_MISSING", text, where="router.endpoints", fix=fix)
+    raise PeerRefused(missing, *extensions.problems)
 
 
 def listens(config: PeersSection) -> tuple[str, ...]:

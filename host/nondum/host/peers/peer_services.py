@@ -14,6 +14,7 @@ from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.events.facts import UnitsTaken
 from nondum.host.core.events.peers import CertificatesBrought
 from nondum.host.core.plain import Row
+from nondum.host.extension.hookspecs import FleetMember, MakeFleet
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
 from nondum.host.mind.composition import Composition
@@ -23,7 +24,7 @@ from nondum.host.peers.asking import Asking
 from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.finder import PeerFinder
-from nondum.host.peers.fleet_transport import fleet_of, listens, own_hosts
+from nondum.host.peers.fleet_transport import listens, own_hosts
 from nondum.host.peers.goals import Goals
 from nondum.host.peers.name_conflicts import NameConflicts
 from nondum.host.peers.offered_entries import Policy, policy_of
@@ -64,6 +65,7 @@ class PeerServices:
     def __init__(
         self,
         config: HostConfig,
+        make_fleet: MakeFleet,
         trust_store: PeerTrustStore,
         workers: Workers,
         catalogue: Catalogue,
@@ -85,7 +87,7 @@ class PeerServices:
         self._movable = frozenset(config.peers.offer_actuators)
         self.requests = Dispatcher()
         self._make_serving(workers, catalogue)
-        self._make_fleet(config, workers, catalogue, compute)
+        self._make_fleet(config, make_fleet, workers, catalogue, compute)
         self.view = self._made_view(catalogue)
         self._streams = StreamRequests(
             bridge, workers.streams, self.peering, self.fleet, self._hints
@@ -112,7 +114,12 @@ class PeerServices:
         self.requests.hear("values", self.serving.values)
 
     def _make_fleet(
-        self, config: HostConfig, workers: Workers, catalogue: Catalogue, compute: Compute
+        self,
+        config: HostConfig,
+        make_fleet: MakeFleet,
+        workers: Workers,
+        catalogue: Catalogue,
+        compute: Compute,
     ) -> None:
         """The other hosts, how they are found, and what is shared with them."""
         host, own = config.host.name, self._own_uses
@@ -120,14 +127,14 @@ class PeerServices:
         self._strangers = RejectedHosts(self._emit, clock)
         self._name_conflicts = NameConflicts(host, clock, self._hints)
         self.finder: PeerFinder | None = None
-        self.fleet = fleet_of(
-            config,
+        member = FleetMember(
             self.trust_store.identity(development=config.peers.development),
             self.trust_store.trust,
             self.requests,
             on_event=self._on_fleet,
             find=lambda mesh: self._find(mesh, config.peers),
         )
+        self.fleet = make_fleet(member)
         self.peering = Peering(
             host,
             self.fleet,
@@ -177,6 +184,7 @@ class PeerServices:
     async def open(
         cls,
         config: HostConfig,
+        make_fleet: MakeFleet,
         folders: Folders,
         workers: Workers,
         catalogue: Catalogue,
@@ -206,7 +214,7 @@ class PeerServices:
         )
         bridge = Bridge(children.forks, listens(config.peers), port=config.peers.stream_port)
         made = cls(
-            *(config, trust_store, workers, catalogue, emit, compute),
+            *(config, make_fleet, trust_store, workers, catalogue, emit, compute),
             *(mind, stop, answer, placement, bridge),
         )
         return made

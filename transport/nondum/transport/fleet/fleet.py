@@ -11,6 +11,8 @@ from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import PeerEvent
 from nondum.transport.peers.identity import Security
 from nondum.transport.peers.keys import PeerKey
+from nondum.transport.peers.refusals import Refusals
+from nondum.transport.peers.trust import Trust
 
 OWN_METHODS = "fleet."
 """Calls and notices that begin so are the fleet's own: no handler ever sees one."""
@@ -68,8 +70,15 @@ class Fleet(Protocol):
     def security(self) -> Security:
         """How links are secured; to be shown with every status."""
 
+    @property
+    def refusals(self) -> Refusals:
+        """Hosts that were turned away, and why."""
+
     async def start(self) -> None:
         """Be there for peers. Raises `PeerRefused` for what cannot be listened at."""
+
+    def set_trust(self, trust: Trust) -> None:
+        """Exchange the trust: peers that it does not let in any more are cut at once."""
 
     def publish(self, changes: Mapping[str, Body | None]) -> None:
         """Change this host's catalogue, by keys of entries; None removes one.

@@ -61,6 +61,11 @@ CODES = (
         "split what it tells into several",
     ),
     Code(
+        "FLEET_AMBIGUOUS",
+        "More than one extension of the host would reach its peers as its configuration says.",
+        "uninstall all of them but one",
+    ),
+    Code(
         "GOALS_NOT_TAKEN",
         "The other host takes no goals from others.",
         "its integrator says so: `accept_goals` under [peers]",
@@ -260,7 +265,7 @@ CODES = (
     Code(
         "ROUTER_UNREACHED",
         "The router of the fleet cannot be reached.",
-        "look whether it runs, and at `router` under [peers]",
+        "look whether it runs, and at `endpoints` under [router]",
     ),
     Code(
         "STATIC_HOST",
@@ -289,7 +294,7 @@ CODES = (
     ),
     Code(
         "ZENOH_MISSING",
-        "Fleets over a Zenoh router need the package eclipse-zenoh.",
+        "Fleets over a Zenoh router need an extension of the host, and the package eclipse-zenoh.",
         "pip install 'nondum[zenoh]'",
     ),
 )

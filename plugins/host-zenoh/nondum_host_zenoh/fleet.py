@@ -15,8 +15,6 @@ from collections.abc import Callable, Mapping
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
 from nondum.transport.fleet.fleet import FleetEvent, Peer
-from nondum.transport.fleet.zenoh_line import RouterAccess
-from nondum.transport.fleet.zenoh_node import ZenohNode
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import PeerEvent, PeerUp
 from nondum.transport.peers.identity import Identity, Security
@@ -25,6 +23,8 @@ from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.node import fresh_epoch
 from nondum.transport.peers.refusals import Refusals
 from nondum.transport.peers.trust import Trust
+from nondum_host_zenoh.line import RouterAccess
+from nondum_host_zenoh.node import ZenohNode
 
 STATE_S = 3.0
 """Time between two tellings of this host's state to all."""

@@ -15,7 +15,6 @@ from datetime import UTC, datetime
 
 from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
-from nondum.transport.fleet.zenoh_line import Line, Listeners, Place, RouterAccess
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.dial import FIRST_WAIT_S, LONGEST_WAIT_S
 from nondum.transport.peers.drained import Sent
@@ -32,6 +31,7 @@ from nondum.transport.peers.pulse import Pulse
 from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.suspicion import Terms
 from nondum.transport.peers.trust import Admission, Trust, TrustState
+from nondum_host_zenoh.line import Line, Listeners, Place, RouterAccess
 
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""

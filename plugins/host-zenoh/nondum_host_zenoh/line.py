@@ -1,8 +1,8 @@
 """This host's session with a Zenoh router: who is present there, and messages to and fro.
 
-Needs the extra `zenoh` (eclipse-zenoh). Everything of that library is used here and nowhere else:
-its callbacks come on its own threads and hop to the loop; what may wait for the network runs on one
-more thread. Shared memory is off: a router took hundreds of megabytes for it.
+Everything of the library eclipse-zenoh is used here and nowhere else: its callbacks come on its own
+threads and hop to the loop; what may wait for the network runs on one more thread. Shared memory is
+off: a router took hundreds of megabytes for it.
 
 Below `nondum/FLEET`, where a place is `KEY/EPOCH` with the key in hexadecimal:
 `here/PLACE` liveliness, `to/PLACE/PLACE/NUMBER` a message to the first place from the second,

@@ -1,0 +1,1 @@
+"""Fleets by way of a Zenoh router, as an extension of nondum's host."""
