@@ -116,13 +116,7 @@ class ZenohNode:
         self._on_event = on_event
         self._gate = Gate(identity, trust, clock)
         self._peer_table = PeerTable(
-            self._gate,
-            epoch,
-            handler,
-            self.refusals,
-            on_event,
-            Pulse(),
-            terms=TERMS,
+            *(self._gate, epoch, handler, self.refusals, on_event, Pulse()), terms=TERMS
         )
         self._loop = asyncio.get_running_loop()
         listeners = Listeners(self._on_present, self._on_message, self._on_to_all, self._on_trouble)

@@ -197,6 +197,7 @@ class PeerServices:
     ) -> PeerServices:
         """Read keys and trust, and look at this machine; `judged_by` is what payloads are judged by
         now. Raises `PeerRefused`."""
+        made: PeerServices
         trust_store = await PeerTrustStore.open(
             folders.peers,
             config.host.name,

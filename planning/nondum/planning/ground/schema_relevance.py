@@ -106,10 +106,8 @@ def relevant_part(merged: Merged, goal: GoalExpr) -> RelevantPart:
                     actions.add(action.name)
                     new += _asked(action, known)
         waiting += wishes.new(new)
-    domain = replace(
-        merged.domain,
-        actions={name: a for name, a in merged.domain.actions.items() if name in actions},
-    )
+    kept = {name: a for name, a in merged.domain.actions.items() if name in actions}
+    domain = replace(merged.domain, actions=kept)
     return RelevantPart(replace(merged, domain=domain), wishes)
 
 
