@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import pytest
 from tests.transport.peers.hosts import Servant
@@ -24,29 +24,35 @@ def mine(member: FleetMember) -> Fleet:
     raise AssertionError(member)
 
 
-def extended() -> Extensions:
-    """What ships, and an extension that would reach peers whatever the configuration says."""
+@hookimpl
+def mine_always(config: HostConfig) -> Mapping[str, MakeFleet]:
+    return {"mine": mine}
 
-    @hookimpl
-    def fleets(config: HostConfig) -> Mapping[str, MakeFleet]:
-        return {"mine": mine}
 
-    extensions = Extensions([])
-    extensions.manager.register(types.SimpleNamespace(fleets=fleets), "mine")
+@hookimpl
+def mistaken(config: HostConfig) -> Mapping[str, MakeFleet]:
+    raise ZeroDivisionError("a mistake")
+
+
+def extended(fleets: Callable[[HostConfig], Mapping[str, MakeFleet]]) -> Extensions:
+    """What ships, and an extension with this hook."""
+    extensions, extension = Extensions([]), types.ModuleType("mine")
+    extension.__dict__["fleets"] = fleets
+    extensions.manager.register(extension, "mine")
     return extensions
 
 
 async def test_hosts_are_linked_one_by_one_where_no_router_is_named() -> None:
     make = chosen(Extensions([]), HostConfig())
-    identity, found = Identity("rover", HostKeys.generate()), []
-    fleet = make(FleetMember(identity, Trust(), Servant(), found.append, lambda _: pytest.fail()))
+    identity = Identity("rover", HostKeys.generate())
+    fleet = make(FleetMember(identity, Trust(), Servant(), pytest.fail, lambda _: pytest.fail()))
     assert isinstance(fleet, Mesh)
     assert fleet.key == identity.key
     await fleet.close()
 
 
 def test_router_is_for_the_extension_that_uses_one() -> None:
-    assert chosen(extended(), ROUTER) is mine
+    assert chosen(extended(mine_always), ROUTER) is mine
 
 
 def test_router_that_no_extension_uses_is_refused() -> None:
@@ -58,20 +64,14 @@ def test_router_that_no_extension_uses_is_refused() -> None:
 
 
 def test_extension_that_does_not_work_is_told_with_the_router_that_is_refused() -> None:
-    @hookimpl
-    def fleets(config: HostConfig) -> Mapping[str, MakeFleet]:
-        raise ZeroDivisionError("a mistake")
-
-    extensions = Extensions([])
-    extensions.manager.register(types.SimpleNamespace(fleets=fleets), "mine")
     with pytest.raises(PeerRefused) as refused:
-        chosen(extensions, ROUTER)
+        chosen(extended(mistaken), ROUTER)
     codes = [problem.code for problem in refused.value.problems]
     assert codes == ["ZENOH_MISSING", "EXTENSION_BROKEN"]
 
 
 def test_two_ways_to_reach_the_same_hosts_are_refused() -> None:
     with pytest.raises(PeerRefused) as refused:
-        chosen(extended(), HostConfig())
+        chosen(extended(mine_always), HostConfig())
     (problem,) = refused.value.problems
-    assert (problem.code, problem.have) == ("FLEET_AMBIGUOUS", "mesh, mine")
+    assert (problem.code, problem.have) == ("FLEET_AMBIGUOUS", "mine, mesh")

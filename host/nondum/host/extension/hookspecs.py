@@ -106,10 +106,11 @@ def listeners(host: Host) -> Iterable[Emit]:  # type: ignore[empty-body]  # a sp
 
 @hookspec
 def fleets(config: HostConfig) -> Mapping[str, MakeFleet]:  # type: ignore[empty-body]  # a specification
-    """The ways to reach other hosts that the configuration asks for, by name: what makes a fleet.
+    """The ways to reach other hosts that the configuration asks for, by name.
 
-    Of all extensions together exactly one must answer with one (FLEET_AMBIGUOUS, ZENOH_MISSING). It
-    is asked only on hosts that have peers.
+    Each is a function that makes a `nondum.transport.fleet.Fleet` for a `member`, not started yet.
+    All extensions together must have exactly one (FLEET_AMBIGUOUS, ZENOH_MISSING); where it raises
+    `PeerRefused`, the host does not start. Asked only on hosts that have peers.
     """
 
 
