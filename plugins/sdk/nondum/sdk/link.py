@@ -87,6 +87,7 @@ class Link:
         credit: int = CREDIT,
         *,
         max_handles: int = 0,
+        limit: int = MAX_PACKET,
     ) -> None:
         """Own `sock` and begin to read.
 
@@ -94,11 +95,12 @@ class Link:
         answers with its result, its `NondumError`, or HALTED when it is cancelled.
         `on_event(name, body, call_id)` is called at once. `on_closed` is called once when the other
         end is gone, and after `on_violation` when it broke the protocol; not after `close`.
-        A packet with more than `max_handles` descriptors is a violation.
+        A packet with more than `max_handles` descriptors, or `limit` bytes, is a violation.
         """
         self._on_request, self._on_event = on_request, on_event
         self._on_closed, self._on_violation = on_closed, on_violation
         self._credit, self._free, self._max_handles = credit, credit, max_handles
+        self._limit = limit
         self._credit_waiters: deque[asyncio.Future[None]] = deque()
         self._ids = itertools.count(1)
         self._pending: dict[int, Pending] = {}
@@ -108,7 +110,7 @@ class Link:
         self._greeting: asyncio.Future[Hello | Welcome] = asyncio.get_running_loop().create_future()
         self.is_closed = False
         is_socket = isinstance(sock, socket.socket)
-        self._packets: Packets = SocketPackets(sock, MAX_PACKET) if is_socket else sock  # type: ignore[assignment,arg-type]  # narrowed by is_socket
+        self._packets: Packets = SocketPackets(sock, limit) if is_socket else sock  # type: ignore[assignment,arg-type]  # narrowed by is_socket
         self._packets.open(self._receive, self._lose)
 
     async def request(self, verb: str, body: Body, fds: Sequence[Handle] = ()) -> dict[str, Any]:
@@ -196,7 +198,7 @@ class Link:
             discard(self._waiting.popleft()[1])
 
     def _send(self, message: WireMessage, handles: tuple[Handle, ...] = ()) -> None:
-        data = encode(message)
+        data = encode(message, self._limit)
         if not self._waiting and self._packets.send(data, handles):
             return
         self._waiting_bytes += len(data)
@@ -223,7 +225,7 @@ class Link:
 
     def _receive(self, data: bytes, handles: tuple[Handle, ...]) -> None:
         try:
-            message = decode(data)
+            message = decode(data, self._limit)
             if len(handles) > (self._max_handles if isinstance(message, Request) else 0):
                 raise ProtocolViolation(
                     Problem("PACKET_DESCRIPTORS", "a packet carries unexpected descriptors")
