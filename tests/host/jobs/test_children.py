@@ -22,9 +22,9 @@ from tests.kit.until import until_async
 
 from nondum.host.jobs import allowance
 from nondum.host.jobs.children import ASIDE_STALL_S, KEPT, QUIET_S, STALL_S, START_S, Children
-from nondum.host.rpc.outcomes import asked
-from nondum.host.rpc.pieces import cut
+from nondum.host.rpc.outcomes import packed
 from nondum.sdk.errors import DriveGone, InstallFailed
+from nondum.sdk.pieces import cut
 from nondum.sdk.wire import Request, encode
 from nondum.transport import link_sockets
 
@@ -73,7 +73,7 @@ def test_child_ends_in_silence_once_its_daemon_was_killed(tmp_path: Path) -> Non
     program = [sys.executable, "-c", "from nondum.host.jobs import child; child.work()"]
     daemon, requests = link_sockets()
     with requests, daemon:
-        for packet in cut(encode(Request(1, "look", asked(drive(tmp_path))))):
+        for packet in cut(encode(Request(1, "look", packed(drive(tmp_path))))):
             daemon.send(packet)
         daemon.close()
         ended = subprocess.run(program, stdin=requests.fileno(), capture_output=True, check=False)

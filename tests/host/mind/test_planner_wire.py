@@ -7,7 +7,7 @@ from hypothesis import given
 from tests.planning.search.random_tasks import tasks
 
 from nondum.host.mind import planner_wire as wire
-from nondum.host.rpc.outcomes import done, outcome
+from nondum.host.rpc.outcomes import packed, unpacked
 from nondum.sdk.errors import PlannerFailed
 from nondum.sdk.planner import (
     AlreadyTrue,
@@ -47,7 +47,7 @@ def test_text_arrives_unchanged() -> None:
     ids=lambda answer: type(answer).__name__,
 )
 def test_answer_arrives_unchanged(answer: Answer | PlanText) -> None:
-    assert wire.answer_from_wire(outcome(done(wire.answer_to_wire(answer)))) == answer
+    assert wire.answer_from_wire(unpacked(packed(wire.answer_to_wire(answer)))) == answer
 
 
 @pytest.mark.parametrize(

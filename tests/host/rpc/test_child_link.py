@@ -15,9 +15,9 @@ from tests.kit.until import arrived
 
 from nondum.host.rpc.channel import Channel, Tell
 from nondum.host.rpc.child_link import ChildLink
-from nondum.host.rpc.outcomes import done, outcome
-from nondum.host.rpc.pieces import cut
+from nondum.host.rpc.outcomes import packed, unpacked
 from nondum.sdk.errors import DriveGone, LinkClosed, NondumError, Problem, ProtocolViolation
+from nondum.sdk.pieces import cut
 from nondum.sdk.wire import Body, Event, Reply, Request, encode
 from nondum.transport import link_sockets
 
@@ -32,7 +32,7 @@ def do(verb: str, value: Any, tell: Tell) -> Any:
             raise DriveGone(Problem("DRIVE_GONE", value))
         case "tell":
             for number in range(value):
-                tell("heard", {"number": number})
+                tell("told", {"number": number})
         case "fail":
             raise LookupError(value)
     return value
@@ -74,7 +74,7 @@ def saying(*packets: bytes) -> Callable[[socket.socket], None]:
 
 
 async def ask(link: ChildLink, verb: str, value: Any) -> Any:
-    return outcome(await arrived("a reply", link.ask(verb, value)))
+    return unpacked(await arrived("a reply", link.ask(verb, value)))
 
 
 async def test_child_answers_one_request_after_the_other() -> None:
@@ -106,11 +106,11 @@ async def test_refusal_is_raised_and_the_child_goes_on() -> None:
 
 
 async def test_events_of_a_request_come_before_its_reply() -> None:
-    heard: list[tuple[str, Body]] = []
+    told: list[tuple[str, Body]] = []
     async with a_link(obedient) as link:
-        await link.ask("tell", 3, lambda name, body: heard.append((name, body)))
+        await link.ask("tell", 3, lambda name, body: told.append((name, body)))
         await link.ask("tell", 3)
-    assert heard == [("heard", {"number": number}) for number in range(3)]
+    assert told == [("told", {"number": number}) for number in range(3)]
 
 
 async def test_child_that_ends_is_told() -> None:
@@ -125,7 +125,7 @@ async def test_child_that_ends_is_told() -> None:
         pytest.param([b"no piece"], "PACKET_MALFORMED", id="no piece"),
         pytest.param([b"\1no message"], "PACKET_MALFORMED", id="no message"),
         pytest.param([b"\0" + b"a" * 60_000] * 70, "PACKET_TOO_LONG", id="too long"),
-        pytest.param([*cut(encode(Reply(7, done(1))))], "UNKNOWN_CALL", id="another call"),
+        pytest.param([*cut(encode(Reply(7, packed(1))))], "UNKNOWN_CALL", id="another call"),
         pytest.param([*cut(encode(Request(1, "give", {})))], "REQUEST_UNASKED", id="a request"),
         pytest.param([*cut(encode(Event("wrong", 1, {})))], "EVENT_UNKNOWN", id="an event"),
         pytest.param([*cut(encode(Reply(1, {})))], "PACKET_FIELDS", id="no reply"),
@@ -137,5 +137,5 @@ async def test_child_that_breaks_the_protocol_is_told(packets: list[bytes], code
 
     async with a_link(saying(*packets)) as link:
         with pytest.raises(NondumError) as violation:
-            outcome(await arrived("a reply", link.ask("give", 1, on_news)))
+            unpacked(await arrived("a reply", link.ask("give", 1, on_news)))
         assert violation.value.code == code

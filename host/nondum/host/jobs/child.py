@@ -23,8 +23,7 @@ from typing import Any
 from nondum.host.core.brief import brief
 from nondum.host.jobs import fork_server, table
 from nondum.host.jobs.allowance import allowed, confine_process
-from nondum.host.jobs.progress import BEGUN, LONGEST, PROGRESS, Progress
-from nondum.host.jobs.table import Arguments, Report
+from nondum.host.jobs.table import LONGEST, PROGRESS, Arguments, Progress, Report
 from nondum.host.rpc.channel import Channel, Tell, conversation
 from nondum.host.sandbox.inside import kernel
 from nondum.host.sandbox.levels import host_children
@@ -87,7 +86,7 @@ def _do(job: str, arguments: Arguments, tell: Tell) -> Any:
     try:
         with allowed(job):
             do = table.find(job)
-            tell(BEGUN, {})
+            tell("begun", {})
             return do(arguments, _reporter(tell))
     except NondumError as error:
         error.problems = brief(error.problems)

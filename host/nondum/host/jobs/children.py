@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.jobs.fork_client import ForkClient, Forked
-from nondum.host.jobs.progress import LONGEST, PROGRESS, Progress
+from nondum.host.jobs.table import LONGEST, PROGRESS, Progress
 from nondum.host.rpc.child_link import ChildLink
-from nondum.host.rpc.outcomes import outcome
+from nondum.host.rpc.outcomes import unpacked
 from nondum.sdk.errors import InstallFailed, LinkClosed, Problem
 from nondum.sdk.wire import Body
 from nondum.sdk.wire_fields import read_field
@@ -135,7 +135,7 @@ class Children:
         finally:
             self._tend()
         await self._keep(child, owner)
-        return outcome(answer)
+        return unpacked(answer)
 
     async def run_aside(
         self, job: str, arguments: Mapping[str, Any], *, stall_s: float = ASIDE_STALL_S
@@ -148,7 +148,7 @@ class Children:
         self._busy.add(child)
         try:
             _make_idle(child.process.pid)
-            return outcome(await child.do(job, arguments, stall_s))
+            return unpacked(await child.do(job, arguments, stall_s))
         finally:
             await self._end(child)
 

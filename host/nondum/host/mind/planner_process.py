@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from nondum.host.mind import planner_wire as wire
 from nondum.host.mind.planner_folder import PlannerFolder
 from nondum.host.rpc.child_link import ChildLink
-from nondum.host.rpc.outcomes import outcome
+from nondum.host.rpc.outcomes import unpacked
 from nondum.sdk.errors import LinkClosed, NondumError, PlannerFailed, Problem
 from nondum.sdk.planner import Answer, GaveUp, PlanText
 from nondum.transport import link_sockets
@@ -57,7 +57,6 @@ class PlannerProcess:
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
         self._link: ChildLink | None = None
-        self._is_ready = False
         self._going: set[asyncio.Future[Any]] = set()
         """Tasks that outlive a cancelled caller; `close` waits for them."""
         self._language = ""
@@ -125,7 +124,7 @@ class PlannerProcess:
     async def _running(self) -> ChildLink:
         """The link to the child, which is started if there is none."""
         is_there = self._process is not None and self._process.returncode is None
-        if self._link is not None and is_there and self._is_ready:
+        if self._link is not None and is_there and self._language:
             return self._link
         await self._kill()
         folder = await self._to_its_end(asyncio.to_thread(self._folder.make))
@@ -142,7 +141,6 @@ class PlannerProcess:
             case _:
                 await self._kill()
                 raise self._failure("PLANNER_START", f"it speaks no language of this host: {told}")
-        self._is_ready = True
         return self._link
 
     async def _started(self, folder: Mapping[str, str]) -> ChildLink:
@@ -174,7 +172,7 @@ class PlannerProcess:
 
     async def _ask(self, link: ChildLink, verb: str, value: object) -> object:
         try:
-            return outcome(await link.ask(verb, value))
+            return unpacked(await link.ask(verb, value))
         except LinkClosed as error:
             raise self._failure("PLANNER_DIED", "it ended without an answer") from error
         except PlannerFailed:
@@ -186,7 +184,7 @@ class PlannerProcess:
         link, self._link = self._link, None
         if link is not None:
             link.close()
-        process, self._process, self._is_ready = self._process, None, False
+        process, self._process, self._language = self._process, None, ""
         if process is None:
             return
         _end(process)

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from nondum.host.rpc import outcomes
-from nondum.host.rpc.pieces import Joined, cut
 from nondum.sdk.errors import NondumError
+from nondum.sdk.pieces import Joined, cut
 from nondum.sdk.wire import MAX_PACKET, Body, Event, Reply, Request, WireMessage, decode, encode
 
 Tell: TypeAlias = Callable[[str, Body], None]
@@ -47,7 +47,7 @@ class Channel:
         Raises `ProtocolViolation`.
         """
         with contextlib.suppress(ConnectionError):  # the daemon is gone and reads no answer
-            while (message := self._heard()) is not None:
+            while (message := self._received()) is not None:
                 if isinstance(message, Request):
                     self._say(Reply(message.id, self._outcome(message, do)))
 
@@ -56,7 +56,7 @@ class Channel:
             self._say(Event(name, request.id, body))
 
         try:
-            return outcomes.done(do(request.verb, outcomes.about(request.body), tell))
+            return outcomes.packed(do(request.verb, outcomes.unpacked(request.body), tell))
         except NondumError as error:
             return outcomes.refused(error)
 
@@ -66,7 +66,7 @@ class Channel:
             for packet in cut(data):
                 self._sock.send(packet)
 
-    def _heard(self) -> WireMessage | None:
+    def _received(self) -> WireMessage | None:
         """The next message; None when the other end is gone."""
         while packet := self._sock.recv(MAX_PACKET):
             if (data := self._joined.add(packet)) is not None:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any, NoReturn, TypeAlias
 
 from nondum.host.rpc import outcomes
-from nondum.host.rpc.pieced_packets import PiecedPackets
 from nondum.sdk.errors import LinkClosed, Problem, ProtocolViolation
 from nondum.sdk.link import Link
 from nondum.sdk.packets import Handle, SocketPackets
@@ -29,7 +28,7 @@ class ChildLink:
         self._on_news: OnNews | None = None
         self._violation: ProtocolViolation | None = None
         self._link = Link(
-            PiecedPackets(SocketPackets(sock, MAX_PACKET, max_handles=0), limit),
+            SocketPackets(sock, MAX_PACKET, max_handles=0),
             self._refuse,
             self._on_event,
             lambda: None,
@@ -39,14 +38,14 @@ class ChildLink:
         )
 
     async def ask(self, verb: str, value: Any, on_news: OnNews | None = None) -> Body:
-        """Ask about a value; the reply, of which `outcomes.outcome` has the result.
+        """Ask about a value; the reply, of which `outcomes.unpacked` has the result.
 
         Being cancelled does not stop the child, which hears nothing meanwhile: kill it. Raises
         `LinkClosed` when it has ended, `ProtocolViolation` when it broke the protocol.
         """
         self._on_news = on_news
         try:
-            return await self._link.request(verb, outcomes.asked(value))
+            return await self._link.request(verb, outcomes.packed(value))
         except LinkClosed:
             if self._violation is not None:
                 raise self._violation from None

@@ -1,21 +1,19 @@
-"""What a request is about and what comes of it, as the body of a message of a worker link.
+"""What a request is about and what comes of it, as the body of a message of a worker link. Pure.
 
 Both are plain data that is packed for itself: the limits of a link's packets are for strangers, and
 names of files need be no UTF-8. A refusal carries the class of its error, which a `Failure` of a
-worker link does not. Pure.
+worker link does not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import msgpack
 
 from nondum.sdk import errors
-from nondum.sdk.codec.checks import Mismatch
-from nondum.sdk.codec.values import from_plain, to_plain
+from nondum.sdk.codec.values import reader, to_plain
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
 from nondum.sdk.wire import Body
 
@@ -24,62 +22,35 @@ _CLASSES: Mapping[str, type[NondumError]] = {
     for name, found in vars(errors).items()
     if isinstance(found, type) and issubclass(found, NondumError)
 }
+_problems = reader(tuple[Problem, ...])
 
 
-@dataclass(frozen=True, slots=True)
-class _Refusal:
-    error: str
-    problems: tuple[Problem, ...]
+def packed(value: Any) -> Body:
+    """The body of a request about a value, or of a reply with it as the result.
 
-
-def asked(value: Any) -> Body:
-    """The body of a request about a value. Raises `TypeError` for what is no plain data."""
-    return {"about": _packed(value)}
-
-
-def about(body: Body) -> Any:
-    """What a request is about. Raises `ProtocolViolation`."""
-    return _unpacked(body.get("about"))
-
-
-def done(value: Any) -> Body:
-    """The body of a reply with a result. Raises `TypeError` for what is no plain data."""
-    return {"result": _packed(value)}
+    Raises `TypeError` for what is no plain data.
+    """
+    return {"value": msgpack.packb(value, unicode_errors="surrogatepass")}
 
 
 def refused(error: NondumError) -> Body:
     """The body of a reply that is a refusal; of a class that is known nowhere else, the nearest."""
     name = next(kind.__name__ for kind in type(error).__mro__ if kind.__name__ in _CLASSES)
-    return {"refusal": _packed(to_plain(_Refusal(name, error.problems)))}
+    return {"error": name, **packed(to_plain(error.problems))}
 
 
-def outcome(body: Body) -> Any:
-    """The result in a reply. Raises the `NondumError` in it, or `ProtocolViolation`.
+def unpacked(body: Body) -> Any:
+    """The value in a body. Raises the `NondumError` of a refusal, or `ProtocolViolation`.
 
-    >>> outcome(done({"at": 7}))
+    >>> unpacked(packed({"at": 7}))
     {'at': 7}
     """
-    if "result" in body:
-        return _unpacked(body["result"])
     try:
-        refusal = from_plain(_Refusal, _unpacked(body.get("refusal")))
-        error = _CLASSES[refusal.error](*refusal.problems)
-    except (Mismatch, KeyError, ValueError) as wrong:
-        raise _violation(f"no refusal: {wrong}") from wrong
+        value = msgpack.unpackb(body["value"], unicode_errors="surrogatepass", strict_map_key=True)
+        if "error" not in body:
+            return value
+        error = _CLASSES[body["error"]](*_problems(value))
+    except (KeyError, TypeError, ValueError, msgpack.UnpackException) as wrong:
+        text = f"no value and no refusal: {type(wrong).__name__}: {wrong}"
+        raise ProtocolViolation(Problem("PACKET_FIELDS", text)) from wrong
     raise error
-
-
-def _packed(value: Any) -> bytes:
-    packed: bytes = msgpack.packb(value, unicode_errors="surrogatepass")
-    return packed
-
-
-def _unpacked(data: object) -> Any:
-    try:
-        return msgpack.unpackb(data, unicode_errors="surrogatepass", strict_map_key=True)
-    except (ValueError, TypeError, msgpack.UnpackException) as error:
-        raise _violation(f"no value: {error}") from error
-
-
-def _violation(message: str) -> ProtocolViolation:
-    return ProtocolViolation(Problem("PACKET_FIELDS", message))

@@ -24,7 +24,7 @@ from tests.kit.golden import Golden
 from tests.kit.loop_devices import attached
 from tests.kit.until import until
 
-from nondum.host.rpc.outcomes import outcome
+from nondum.host.rpc.outcomes import unpacked
 from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
 from nondum.host.sandbox.helper import HelperClient, drive_nodes, removals, requests
@@ -167,7 +167,7 @@ def code(answer: WireMessage) -> str:
     """The code of a refusal; none of a result."""
     assert isinstance(answer, Reply) and answer.id == requests.CALL
     try:
-        outcome(answer.body)
+        unpacked(answer.body)
     except NondumError as error:
         return error.code
     return ""

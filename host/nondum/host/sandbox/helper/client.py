@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.feedback_state import State
-from nondum.host.rpc.outcomes import outcome
+from nondum.host.rpc.outcomes import unpacked
 from nondum.host.sandbox.cgroups.limits import CgroupLimits, Usage
 from nondum.host.sandbox.helper import requests, worker_users
 from nondum.host.sandbox.helper.requests import Request
@@ -263,7 +263,7 @@ def _received(asked: socket.socket) -> bytes:
 def _result(said: WireMessage) -> Any:
     """What was asked for. Raises what the helper raised, `InstallFailed` (HELPER_SILENT)."""
     if isinstance(said, Reply):
-        return outcome(said.body)
+        return unpacked(said.body)
     raise _silent("it says something else")
 
 

@@ -128,7 +128,7 @@ def answer(connection: socket.socket, service: Service) -> Reply:
             raise refused(f"{type(request).__name__} came with {len(brought)} descriptors")
         if isinstance(request, requests.ListenToStopKey):
             return _listen(connection, service)
-        return Reply(CALL, outcomes.done(service.serve(request, *brought)))
+        return Reply(CALL, outcomes.packed(service.serve(request, *brought)))
     except NondumError as error:
         return _answer(error)
     except OSError as error:
@@ -148,7 +148,7 @@ def _listen(connection: socket.socket, service: Service) -> Reply:
             sources: list[socket.socket | PressesOfDevice] = [connection, presses]
             ready, _, _ = select.select(sources, [], [])
             if connection in ready:
-                return Reply(CALL, outcomes.done({}))
+                return Reply(CALL, outcomes.packed({}))
             if pressed := presses.read():
                 _tell(connection, PRESSED, {"times": pressed})
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum.host.rpc.pieces import Joined, cut
 from nondum.sdk.errors import ProtocolViolation
+from nondum.sdk.pieces import Joined, cut
 from nondum.sdk.wire import MAX_PACKET
 
 
