@@ -109,7 +109,6 @@ async def test_events_of_a_request_come_before_its_reply() -> None:
     told: list[tuple[str, Body]] = []
     async with a_link(obedient) as link:
         await link.ask("tell", 3, lambda name, body: told.append((name, body)))
-        await link.ask("tell", 3)
     assert told == [("told", {"number": number}) for number in range(3)]
 
 
@@ -139,3 +138,12 @@ async def test_child_that_breaks_the_protocol_is_told(packets: list[bytes], code
         with pytest.raises(NondumError) as violation:
             unpacked(await arrived("a reply", link.ask("give", 1, on_news)))
         assert violation.value.code == code
+
+
+async def test_child_that_tells_something_unasked_is_asked_no_more() -> None:
+    event = encode(Event("told", 1, {}))
+    async with a_link(saying(*cut(encode(Reply(1, packed(1)))), *cut(event))) as link:
+        assert await ask(link, "give", 1) == 1
+        with pytest.raises(ProtocolViolation) as violation:
+            await ask(link, "give", 1)
+        assert violation.value.code == "EVENT_UNKNOWN"

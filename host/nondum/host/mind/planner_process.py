@@ -154,7 +154,7 @@ class PlannerProcess:
                     self._process = await asyncio.create_subprocess_exec(
                         *(sys.executable, "-P", "-m", module, self._reference),
                         *(str(self._memory_mb), str(os.getpid())),
-                        stdin=theirs,
+                        stdin=theirs.fileno(),
                         stdout=DEVNULL,
                         stderr=DEVNULL,
                         env={**self._environment, **folder},

@@ -38,7 +38,8 @@ class ChildLink:
         )
 
     async def ask(self, verb: str, value: Any, on_news: OnNews | None = None) -> Body:
-        """Ask about a value; the reply, of which `outcomes.unpacked` has the result.
+        """Ask about a value; the reply, of which `outcomes.unpacked` has the result. Events are for
+        `on_news`; without it, there are to be none.
 
         Being cancelled does not stop the child, which hears nothing meanwhile: kill it. Raises
         `LinkClosed` when it has ended, `ProtocolViolation` when it broke the protocol.
@@ -58,8 +59,9 @@ class ChildLink:
         self._link.close()
 
     def _on_event(self, name: str, body: dict[str, Any], _call_id: int | None) -> None:
-        if self._on_news is not None:
-            self._on_news(name, body)
+        if self._on_news is None:
+            raise ProtocolViolation(Problem("EVENT_UNKNOWN", f"a child tells {name!r} unasked"))
+        self._on_news(name, body)
 
     def _on_violation(self, violation: ProtocolViolation) -> None:
         self._violation = violation

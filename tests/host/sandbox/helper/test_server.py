@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from tests.host.sandbox.helper.replies import code
 from tests.kit.descriptors import descriptors_left
 from tests.kit.disk_images import make_ext4
 from tests.kit.golden import Golden
 from tests.kit.loop_devices import attached
 from tests.kit.until import until
 
-from nondum.host.rpc.outcomes import unpacked
 from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
 from nondum.host.sandbox.helper import HelperClient, drive_nodes, removals, requests
@@ -42,7 +42,6 @@ from nondum.sdk.wire import (
     Event,
     Reply,
     Request,
-    WireMessage,
     decode,
     encode,
 )
@@ -161,16 +160,6 @@ def raw(helper: Helper, *packets: bytes, fds: tuple[int, ...] = ()) -> str:
             return code(decode(asked.recv(MAX_PACKET)))
 
     return served(ask)
-
-
-def code(answer: WireMessage) -> str:
-    """The code of a refusal; none of a result."""
-    assert isinstance(answer, Reply) and answer.id == requests.CALL
-    try:
-        unpacked(answer.body)
-    except NondumError as error:
-        return error.code
-    return ""
 
 
 def test_strangers_are_not_served(helper: Helper) -> None:

@@ -260,10 +260,11 @@ def _received(asked: socket.socket) -> bytes:
         return asked.recv(MAX_PACKET)
 
 
-def _result(said: WireMessage) -> Any:
+def _result(said: WireMessage) -> dict[str, Any]:
     """What was asked for. Raises what the helper raised, `InstallFailed` (HELPER_SILENT)."""
     if isinstance(said, Reply):
-        return unpacked(said.body)
+        result: dict[str, Any] = unpacked(said.body)
+        return result
     raise _silent("it says something else")
 
 
