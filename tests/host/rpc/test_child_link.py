@@ -24,6 +24,8 @@ from nondum.transport import link_sockets
 pytestmark = pytest.mark.anyio
 
 LIMIT = 4 * 1024 * 1024
+PATIENCE_S = 10.0
+"""Nothing here takes long."""
 
 
 def do(verb: str, value: Any, tell: Tell) -> Any:
@@ -74,7 +76,7 @@ def saying(*packets: bytes) -> Callable[[socket.socket], None]:
 
 
 async def ask(link: ChildLink, verb: str, value: Any) -> Any:
-    return unpacked(await arrived("a reply", link.ask(verb, value)))
+    return unpacked(await arrived("a reply", link.ask(verb, value), patience_s=PATIENCE_S))
 
 
 async def test_child_answers_one_request_after_the_other() -> None:
@@ -108,7 +110,8 @@ async def test_refusal_is_raised_and_the_child_goes_on() -> None:
 async def test_events_of_a_request_come_before_its_reply() -> None:
     told: list[tuple[str, Body]] = []
     async with a_link(obedient) as link:
-        await link.ask("tell", 3, lambda name, body: told.append((name, body)))
+        asked = link.ask("tell", 3, lambda name, body: told.append((name, body)))
+        await arrived("a reply", asked, patience_s=PATIENCE_S)
     assert told == [("told", {"number": number}) for number in range(3)]
 
 
@@ -136,7 +139,8 @@ async def test_child_that_breaks_the_protocol_is_told(packets: list[bytes], code
 
     async with a_link(saying(*packets)) as link:
         with pytest.raises(NondumError) as violation:
-            unpacked(await arrived("a reply", link.ask("give", 1, on_news)))
+            asked = link.ask("give", 1, on_news)
+            unpacked(await arrived("a reply", asked, patience_s=PATIENCE_S))
         assert violation.value.code == code
 
 
