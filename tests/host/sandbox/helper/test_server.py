@@ -521,3 +521,21 @@ def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:
             HelperClient(tmp_path / "s").ask(requests.ListCgroups())
         hanging_up.join()
     assert silent.value.code == "HELPER_SILENT"
+
+
+def test_helper_that_says_something_else_is_told(tmp_path: Path) -> None:
+    def tell() -> None:
+        connection, _ = listening.accept()
+        with connection:
+            connection.recv(MAX_PACKET)
+            connection.send(encode(Event("pressed", requests.CALL, {"times": 1})))
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        telling = threading.Thread(target=tell)
+        telling.start()
+        with pytest.raises(NondumError) as silent:
+            HelperClient(tmp_path / "s").ask(requests.ListCgroups())
+        telling.join()
+    assert silent.value.code == "HELPER_SILENT"
