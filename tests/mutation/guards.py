@@ -129,9 +129,17 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         f"{_TH}/jobs/test_install.py",
     ),
     f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/lifecycle/test_rebuilding.py",),
+    # What processes of this host say that read what strangers wrote.
+    f"{_H}/rpc/channel.py": (
+        f"{_TH}/rpc/test_child_link.py",
+        f"{_TH}/peers/streams/test_start.py::test_what_a_bridge_prints_goes_where_its_errors_go",
+    ),
+    f"{_H}/rpc/child_link.py": (f"{_TH}/rpc/test_child_link.py",),
+    f"{_H}/rpc/outcomes.py": (f"{_TH}/rpc/test_outcomes.py",),
     # What its workers send, and take.
     f"{_S}/packets.py": (f"{_TS}/test_link.py",),
     f"{_S}/link.py": (f"{_TS}/test_link.py",),
+    f"{_S}/pieces.py": (f"{_TS}/test_pieces.py",),
     f"{_S}/wire.py": (f"{_TS}/test_wire.py",),
     f"{_S}/wire_fields.py": (f"{_TS}/test_wire.py", f"{_TT}/streams/test_packets.py"),
     f"{_S}/packet_codec.py": (f"{_TS}/test_codec.py",),
@@ -286,6 +294,7 @@ FOLDERS = (
     f"{_H}/sandbox/levels",
     f"{_H}/sandbox/inside",
     f"{_H}/control",
+    f"{_H}/rpc",
     f"{_H}/lifecycle",
     f"{_H}/workers",
     f"{_T}/discovery",

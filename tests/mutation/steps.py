@@ -60,6 +60,7 @@ CONFINING = frozenset(
         *(f"{_INSIDE}/{name}.py" for name in ("limits", "mounts", "restrict")),
         *(f"{_CONFINEMENT}/{name}.py" for name in ("bubblewrap", "landlock", "host_children")),
         "host/nondum/host/peers/streams/process.py",
+        "host/nondum/host/rpc/channel.py",
     }
 )
 """Modules that do hardly anything but take away what a process could do."""

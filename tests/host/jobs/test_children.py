@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import os
 import resource
 import select
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import AsyncIterator
@@ -24,7 +22,11 @@ from tests.kit.until import until_async
 
 from nondum.host.jobs import allowance
 from nondum.host.jobs.children import ASIDE_STALL_S, KEPT, QUIET_S, STALL_S, START_S, Children
+from nondum.host.rpc.outcomes import packed
 from nondum.sdk.errors import DriveGone, InstallFailed
+from nondum.sdk.pieces import cut
+from nondum.sdk.wire import Request, encode
+from nondum.transport import link_sockets
 
 pytestmark = pytest.mark.anyio
 
@@ -69,10 +71,10 @@ async def test_child_works_again_for_the_same_drive_only(tmp_path: Path) -> None
 
 def test_child_ends_in_silence_once_its_daemon_was_killed(tmp_path: Path) -> None:
     program = [sys.executable, "-c", "from nondum.host.jobs import child; child.work()"]
-    daemon, requests = socket.socketpair()
+    daemon, requests = link_sockets()
     with requests, daemon:
-        request = {"job": "look", "arguments": drive(tmp_path)}
-        daemon.sendall(json.dumps(request).encode() + b"\n")
+        for packet in cut(encode(Request(1, "look", packed(drive(tmp_path))))):
+            daemon.send(packet)
         daemon.close()
         ended = subprocess.run(program, stdin=requests.fileno(), capture_output=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, b"", b"")

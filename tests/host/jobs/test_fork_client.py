@@ -77,7 +77,7 @@ async def test_killed_server_takes_its_processes_along() -> None:
             os.kill(server_of(client), signal.SIGKILL)
             await ended.wait()
         assert await forked.wait() == -signal.SIGKILL
-        assert await forked.hear() == b""
+        assert forked.conversation.recv(1) == b""
         forked.close()
 
 
@@ -101,7 +101,7 @@ async def test_killed_server_is_started_again_with_a_warning(
 async def test_return_code_is_that_of_the_process() -> None:
     async with fork_client() as client:
         killed, ends = await client.fork(JOB, START_S), await client.fork(JOB, START_S)
-        await ends.say(b"\n")
+        ends.conversation.send(b"no piece")
         killed.kill()
         assert await killed.wait() == killed.returncode == -signal.SIGKILL
         running = await client.fork(JOB, START_S)

@@ -7,6 +7,7 @@ from hypothesis import given
 from tests.planning.search.random_tasks import tasks
 
 from nondum.host.mind import planner_wire as wire
+from nondum.host.rpc.outcomes import packed, unpacked
 from nondum.sdk.errors import PlannerFailed
 from nondum.sdk.planner import (
     AlreadyTrue,
@@ -23,14 +24,14 @@ from nondum.sdk.planner import (
 @given(tasks())
 def test_task_arrives_unchanged(task: GroundTask) -> None:
     body = wire.Request(task).body("ground")
-    assert wire.task_from_wire(wire.unframed(body)) == task
+    assert wire.task_of("ground", body) == task
 
 
 def test_text_arrives_unchanged() -> None:
     text = PddlTask("(define (domain d))", "(define (problem p))")
     task = GroundTask((), frozenset(), frozenset(), ())
     body = wire.Request(task, lambda: text).body("pddl")
-    assert wire.text_from_wire(wire.unframed(body)) == text
+    assert wire.task_of("pddl", body) == text
 
 
 @pytest.mark.parametrize(
@@ -46,8 +47,7 @@ def test_text_arrives_unchanged() -> None:
     ids=lambda answer: type(answer).__name__,
 )
 def test_answer_arrives_unchanged(answer: Answer | PlanText) -> None:
-    body = wire.frame(wire.answer_to_wire(answer))[wire.LENGTH.size :]
-    assert wire.answer_from_wire(wire.unframed(body)) == answer
+    assert wire.answer_from_wire(unpacked(packed(wire.answer_to_wire(answer)))) == answer
 
 
 @pytest.mark.parametrize(
@@ -55,11 +55,12 @@ def test_answer_arrives_unchanged(answer: Answer | PlanText) -> None:
     [
         None,
         [],
-        ["plan"],
-        ["plan", ["one"], 1],
-        ["plan", [1], "dear"],
-        ["plan text", [1]],
-        ["maybe"],
+        ["plan", [1], 1],
+        [0],
+        [0, ["one"], 1],
+        [0, [1], "dear"],
+        [4, [1]],
+        [5],
     ],
     ids=str,
 )
@@ -67,3 +68,8 @@ def test_what_is_no_answer_is_refused(data: object) -> None:
     with pytest.raises(PlannerFailed) as refused:
         wire.answer_from_wire(data)
     assert refused.value.code == "PLANNER_ANSWER"
+
+
+def test_what_is_no_answer_is_not_sent() -> None:
+    with pytest.raises(TypeError):
+        wire.answer_to_wire("a plan")  # type: ignore[arg-type]  # that is the point

@@ -9,24 +9,26 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import json
 import os
 import socket
 import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from nondum.host.core.brief import brief
 from nondum.host.jobs import fork_server, table
 from nondum.host.jobs.allowance import allowed, confine_process
+from nondum.host.jobs.table import LONGEST, PROGRESS, Arguments, Progress, Report
+from nondum.host.rpc.channel import Channel, Tell, conversation
 from nondum.host.sandbox.inside import kernel
 from nondum.host.sandbox.levels import host_children
-from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.codec.values import to_plain
+from nondum.sdk.errors import InstallFailed, NondumError, Problem
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.store import disk
 
@@ -54,17 +56,8 @@ def main(daemon: int, channel: int) -> None:
 
 
 def work() -> None:
-    """Do the jobs that come over descriptor 0, a socket, until it ends."""
-    with (
-        contextlib.suppress(ConnectionError),  # the daemon is gone and reads no answer
-        os.fdopen(os.dup(0)) as requests,
-        os.fdopen(os.dup(0), "w", buffering=1) as answers,
-    ):
-        os.dup2(1, 0)  # what it starts does not take part in the conversation,
-        os.dup2(2, 1)  # nor does whatever prints
-        for line in requests:
-            request = json.loads(line)
-            _say(answers, _do(request["job"], request["arguments"], answers))
+    """Do the jobs that are asked for over descriptor 0, a socket, until it ends."""
+    Channel(conversation(), LONGEST).serve(_do)
 
 
 def _prepare(name: bytes) -> None:
@@ -88,24 +81,26 @@ def _import(name: str) -> None:
         find(name)
 
 
-def _do(job: str, arguments: dict[str, Any], answers: TextIO) -> dict[str, Any]:
+def _do(job: str, arguments: Arguments, tell: Tell) -> Any:
+    """Do a job. Raises `NondumError`."""
     try:
         with allowed(job):
             do = table.find(job)
-            _say(answers, {"begun": job})
-            return {"result": do(arguments, _reporter(answers))}
+            tell("begun", {})
+            return do(arguments, _reporter(tell))
     except NondumError as error:
-        return _failure(type(error).__name__, *error.problems)
+        error.problems = brief(error.problems)
+        raise
     except OSError as error:
         where = Path(error.filename or arguments.get("store", ""))
-        return _failure("InstallFailed", disk.problem_of(error, job, where))
+        raise InstallFailed(*brief([disk.problem_of(error, job, where)])) from error
     except Exception as error:
         if disk.is_short_of_memory(error):
-            return _failure("InstallFailed", _too_much(job))
+            raise InstallFailed(_too_much(job)) from error
         traceback.print_exc()
         message = f"{job}: {type(error).__name__}: {error}"
         fix = "see the log, and report it with what it says"
-        return _failure("InstallFailed", Problem("INTERNAL", message, fix=fix))
+        raise InstallFailed(*brief([Problem("INTERNAL", message, fix=fix)])) from error
 
 
 def _too_much(job: str) -> Problem:
@@ -113,11 +108,7 @@ def _too_much(job: str) -> Problem:
     return Problem("NO_MEMORY", f"{job} takes more memory than it may", fix=fix)
 
 
-def _failure(kind: str, *problems: Problem) -> dict[str, Any]:
-    return {"error": kind, "problems": [problem.to_dict() for problem in brief(problems)]}
-
-
-def _reporter(answers: TextIO) -> Callable[[str, int, int], None]:
+def _reporter(tell: Tell) -> Report:
     told: dict[str, float] = {}
     lock = threading.Lock()  # a job may have several threads
 
@@ -126,13 +117,9 @@ def _reporter(answers: TextIO) -> Callable[[str, int, int], None]:
             now = time.monotonic()
             if done >= total or now - told.get(phase, 0.0) >= PROGRESS_S:
                 told[phase] = now
-                _say(answers, {"progress": [phase, done, total]})
+                tell(PROGRESS, to_plain(Progress(phase, done, total)))
 
     return report
-
-
-def _say(answers: TextIO, answer: dict[str, Any]) -> None:
-    answers.write(json.dumps(answer, separators=(",", ":")) + "\n")
 
 
 if __name__ == "__main__":

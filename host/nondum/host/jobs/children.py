@@ -1,16 +1,15 @@
 """Child processes that do what may block, hang or choke on hostile bytes: the daemon's end.
 
-Requests go to a child and answers come back over a socket, one JSON object a line. Children are
-forked from a process that has imported what they need and has read nothing (`fork_server.py`). What
-a child reads of a drive could take it over, so from then on it works for that drive only and never
-for anybody else.
+Children are asked as all of the daemon's processes are (`nondum.host.rpc`). They are forked from a
+process that has imported what they need and has read nothing (`fork_server.py`). What a child reads
+of a drive could take it over, so from then on it works for that drive only and never for anybody
+else.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import os
 import signal
@@ -20,8 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.jobs.fork_client import ForkClient, Forked
-from nondum.sdk import errors
-from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.host.jobs.table import LONGEST, PROGRESS, Progress
+from nondum.host.rpc.child_link import ChildLink
+from nondum.host.rpc.outcomes import unpacked
+from nondum.sdk.errors import InstallFailed, LinkClosed, Problem
+from nondum.sdk.wire import Body
+from nondum.sdk.wire_fields import read_field
 from nondum.wheelhouse.store import disk
 
 KEPT = 4
@@ -47,6 +50,47 @@ OnProgress = Callable[[str, int, int], None]
 log = logging.getLogger(__name__)
 
 
+class _Child:
+    """A process that does jobs, and the link to it."""
+
+    def __init__(self, process: Forked) -> None:
+        """Raises `OSError`; then the process is still the caller's."""
+        self.process = process
+        self._link = ChildLink(process.conversation, LONGEST)
+
+    async def do(
+        self,
+        job: str,
+        arguments: Mapping[str, Any],
+        stall_s: float,
+        on_progress: OnProgress | None = None,
+    ) -> Body:
+        """Have it do a job; its reply. Raises `InstallFailed` (CHILD_…), `ProtocolViolation`."""
+        loop = asyncio.get_running_loop()
+        # On a small computer that has much to do, Python takes long until it begins.
+        try:
+            async with asyncio.timeout(max(stall_s, START_S)) as deadline:
+
+                def hear(name: str, body: Body) -> None:
+                    if not deadline.expired():
+                        deadline.reschedule(loop.time() + stall_s)
+                    if name == PROGRESS and on_progress is not None:
+                        told: Progress = read_field(Progress, body)
+                        on_progress(told.phase, told.done, told.total)
+
+                try:
+                    return await self._link.ask(job, dict(arguments), hear)
+                except LinkClosed:
+                    raise _died(job, await self.process.wait()) from None
+        except TimeoutError as error:
+            raise _stalled(job, stall_s) from error
+
+    def close(self) -> None:
+        """Hear no more of it."""
+        self._link.close()
+        self.process.close()
+
+
 class Children:
     """A pool that grows as jobs need it, and shrinks to nothing. `close` it."""
 
@@ -57,10 +101,10 @@ class Children:
         self._quiet_s = quiet_s
         self.forks = ForkClient("nondum.host.jobs.child", on_crowded)
         """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
-        self._kept: dict[str, Forked] = {}
+        self._kept: dict[str, _Child] = {}
         """Owner → the child that worked for this owner only; the last ones last."""
-        self._busy: set[Forked] = set()
-        self._left_behind: set[Forked] = set()
+        self._busy: set[_Child] = set()
+        self._left_behind: set[_Child] = set()
         """Those that were killed and have not ended yet: a disk may hold one for ever."""
         self._shrinking: asyncio.Task[None] | None = None
 
@@ -84,18 +128,14 @@ class Children:
         child = await self._take(owner, job)
         self._busy.add(child)
         try:
-            async with asyncio.timeout(None) as deadline:
-                answer = await _converse(child, job, arguments, on_progress, deadline, stall_s)
-        except TimeoutError as error:
-            await self._end(child)
-            raise _stalled(job, stall_s) from error
+            answer = await child.do(job, arguments, stall_s, on_progress)
         except BaseException:
             await self._end(child)
             raise
         finally:
             self._tend()
         await self._keep(child, owner)
-        return _result(answer)
+        return unpacked(answer)
 
     async def run_aside(
         self, job: str, arguments: Mapping[str, Any], *, stall_s: float = ASIDE_STALL_S
@@ -107,14 +147,10 @@ class Children:
         child = await self._spawn(job)
         self._busy.add(child)
         try:
-            _make_idle(child.pid)
-            async with asyncio.timeout(None) as deadline:
-                answer = await _converse(child, job, arguments, None, deadline, stall_s)
-        except TimeoutError as error:
-            raise _stalled(job, stall_s) from error
+            _make_idle(child.process.pid)
+            return unpacked(await child.do(job, arguments, stall_s))
         finally:
             await self._end(child)
-        return _result(answer)
 
     async def release(self, owner: str) -> None:
         """End the child that is kept for an owner whose work is done."""
@@ -124,7 +160,7 @@ class Children:
 
     def pids(self) -> set[int]:
         """Processes of all children."""
-        return {child.pid for child in (*self._kept.values(), *self._busy)}
+        return {child.process.pid for child in (*self._kept.values(), *self._busy)}
 
     @property
     def server(self) -> int | None:
@@ -133,7 +169,7 @@ class Children:
 
     def kept(self) -> dict[str, int]:
         """Owner → the process of the child that waits for more of its work."""
-        return {owner: child.pid for owner, child in self._kept.items()}
+        return {owner: child.process.pid for owner, child in self._kept.items()}
 
     async def close(self) -> None:
         """Kill all children."""
@@ -147,17 +183,23 @@ class Children:
             child.close()
         await self.forks.close()
 
-    async def _take(self, owner: str, job: str) -> Forked:
+    async def _take(self, owner: str, job: str) -> _Child:
         """A child that has read no bytes of another owner."""
         return self._kept.pop(owner, None) or await self._spawn(job)
 
-    async def _spawn(self, job: str) -> Forked:
+    async def _spawn(self, job: str) -> _Child:
         """A new child.
 
         Raises `InstallFailed` (NO_RESOURCES, IO_ERROR, CHILD_DIED, CHILD_STALLED).
         """
         try:
-            return await self.forks.fork(job, START_S)
+            forked = await self.forks.fork(job, START_S)
+            try:
+                return _Child(forked)
+            except OSError:
+                forked.kill()
+                forked.close()
+                raise
         except TimeoutError as error:
             raise _stalled(job, START_S) from error
         except OSError as error:
@@ -167,7 +209,7 @@ class Children:
             message = f"{job}: no child can be forked: {error}"
             raise InstallFailed(Problem("CHILD_DIED", message, fix=_TRY_AGAIN)) from error
 
-    async def _keep(self, child: Forked, owner: str) -> None:
+    async def _keep(self, child: _Child, owner: str) -> None:
         """Keep a child for its owner, in the place of whichever was kept longest."""
         self._busy.discard(child)
         if not owner:
@@ -190,16 +232,17 @@ class Children:
         while self._kept:
             await self._end(self._kept.pop(next(iter(self._kept))))
 
-    async def _end(self, child: Forked) -> None:
+    async def _end(self, child: _Child) -> None:
         self._busy.discard(child)
         self._left_behind.add(child)  # if this coroutine is cancelled here, `close` waits
-        _make_ordinary(child.pid)  # or, while others work, it gets no processor to end with
-        child.kill()
+        process = child.process
+        _make_ordinary(process.pid)  # or, while others work, it gets no processor to end with
+        process.kill()
         try:
-            await asyncio.wait_for(child.over(), END_S)
+            await asyncio.wait_for(process.over(), END_S)
         except TimeoutError:
-            log.warning("child %d hangs in its disk and is left behind", child.pid)
-        for other in [each for each in self._left_behind if each.is_over]:
+            log.warning("child %d hangs in its disk and is left behind", process.pid)
+        for other in [each for each in self._left_behind if each.process.is_over]:
             self._left_behind.discard(other)
             other.close()
 
@@ -222,33 +265,6 @@ def watched_without_threads() -> Iterator[None]:
         asyncio.set_child_watcher(former)
 
 
-async def _converse(
-    child: Forked,
-    job: str,
-    arguments: Mapping[str, Any],
-    on_progress: OnProgress | None,
-    deadline: asyncio.Timeout,
-    stall_s: float,
-) -> dict[str, Any]:
-    loop = asyncio.get_running_loop()
-    line = json.dumps({"job": job, "arguments": dict(arguments)}) + "\n"
-    await child.say(line.encode())
-    patience_s = max(stall_s, START_S)  # on a small computer that has much to do, Python takes long
-    while True:
-        deadline.reschedule(loop.time() + patience_s)
-        heard = await child.hear()
-        if not heard:
-            raise _died(job, await child.wait())
-        answer: dict[str, Any] = json.loads(heard)
-        patience_s = stall_s
-        if "begun" in answer:
-            continue
-        if "progress" not in answer:
-            return answer
-        if on_progress is not None:
-            on_progress(*answer["progress"])
-
-
 def _make_idle(pid: int) -> None:
     """SCHED_IDLE (sched(7)): below any niceness, and its disk accesses are idle, too."""
     with contextlib.suppress(OSError):  # it died, which is told later, or a sandbox forbids it
@@ -258,15 +274,6 @@ def _make_idle(pid: int) -> None:
 def _make_ordinary(pid: int) -> None:
     with contextlib.suppress(OSError):  # it died, or RLIMIT_NICE leaves no way back
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
-
-
-def _result(answer: Mapping[str, Any]) -> Any:
-    """What a job gave. Raises what it raised."""
-    if "problems" in answer:
-        kind = getattr(errors, answer["error"], InstallFailed)
-        error: NondumError = kind(*(Problem(**problem) for problem in answer["problems"]))
-        raise error
-    return answer["result"]
 
 
 def _stalled(job: str, stall_s: float) -> InstallFailed:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nondum.host.jobs import look
-from nondum.host.jobs.look import Arguments, Report
+from nondum.host.jobs.table import Arguments, Report
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.store import venvs
 from nondum.wheelhouse.store.store import Store

@@ -11,13 +11,11 @@ import signal
 import socket
 import sys
 from asyncio.subprocess import DEVNULL, Process
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 from nondum.host.jobs import fork_server
 from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
-LINE_LIMIT = 16 * 1024 * 1024
-"""Bytes of one line from a process."""
 END_S = 1.0
 """How long a killed server is waited for."""
 
@@ -25,23 +23,16 @@ log = logging.getLogger(__name__)
 
 
 class Forked:
-    """A process of the fork server, with a conversation in lines. `close` it once it has ended, or
-    is to be left behind."""
+    """A process of the fork server. `close` it once it has ended, or is to be left behind."""
 
-    def __init__(
-        self,
-        pid: int,
-        descriptor: int,
-        status: int,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-    ) -> None:
+    def __init__(self, pid: int, descriptor: int, status: int, conversation: socket.socket) -> None:
         """`descriptor` is its pidfd; its return code can be read from `status`. It closes both.
 
         Raises `OSError` when they cannot be watched: then they are still the caller's.
         """
         self.pid = pid
-        self._reader, self._writer = reader, writer
+        self.conversation = conversation
+        """The other end of its descriptor 0, for packets; a link over it is closed before this."""
         self.returncode: int | None = None
         """None until it has ended; negative for a signal."""
         self._descriptor, self._status = descriptor, status
@@ -53,19 +44,6 @@ class Forked:
         except OSError:
             loop.remove_reader(descriptor)
             raise
-
-    async def say(self, line: bytes) -> None:
-        """Write a line to it; one that has ended does not hear it."""
-        with contextlib.suppress(ConnectionError):
-            self._writer.write(line)
-            await self._writer.drain()
-
-    async def hear(self) -> bytes:
-        """The next line from it; b"" if it ended before."""
-        try:
-            return await self._reader.readline()
-        except ConnectionError:  # it ended before it had read everything
-            return b""
 
     def kill(self) -> None:
         """SIGKILL it, if it runs."""
@@ -89,7 +67,7 @@ class Forked:
 
     def close(self) -> None:
         """Hear no more of it, whether it has ended or not."""
-        self._writer.close()
+        self.conversation.close()
         self._forget()
 
     def _see_over(self) -> None:
@@ -131,15 +109,13 @@ class ForkClient:
         """The server's process, while there is one."""
         return self._server.pid if self._server is not None else None
 
-    async def fork(
-        self, message: str, patience_s: float, descriptors: Sequence[int] = ()
-    ) -> Forked:
-        """A new process. It has copies of these descriptors as its 1, 2 …
+    async def fork(self, message: str, patience_s: float) -> Forked:
+        """A new process.
 
         Raises `OSError` when none can be started, `EOFError` when the server ends as soon as it is
         started, `TimeoutError` when it does not answer for so long: then all that it forked ends.
         """
-        forking = asyncio.ensure_future(self._in_turn(message, patience_s, descriptors))
+        forking = asyncio.ensure_future(self._in_turn(message, patience_s))
         try:
             return await asyncio.shield(forking)
         except asyncio.CancelledError:  # the answer is read, or the next one would be taken for it
@@ -169,24 +145,24 @@ class ForkClient:
         async with self._turn:
             await self._end()
 
-    async def _in_turn(self, message: str, patience_s: float, descriptors: Sequence[int]) -> Forked:
+    async def _in_turn(self, message: str, patience_s: float) -> Forked:
         async with self._turn:
             try:
                 async with asyncio.timeout(patience_s):
-                    return await self._from_a_server(message, descriptors)
+                    return await self._from_a_server(message)
             except BaseException as error:
                 if not isinstance(error, OSError) or isinstance(error, TimeoutError):
                     await self._end()
                 raise
 
-    async def _from_a_server(self, message: str, descriptors: Sequence[int]) -> Forked:
+    async def _from_a_server(self, message: str) -> Forked:
         if self._channel is not None:
             with contextlib.suppress(EOFError):
-                return await self._fork(self._channel, message, descriptors)
+                return await self._fork(self._channel, message)
             log.warning("the fork server has ended; another one is started")
             await self._end()
         self._channel = await self._start()
-        return await self._fork(self._channel, message, descriptors)
+        return await self._fork(self._channel, message)
 
     async def _start(self) -> socket.socket:
         channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -209,35 +185,29 @@ class ForkClient:
                 raise
         return channel
 
-    async def _fork(
-        self, channel: socket.socket, message: str, descriptors: Sequence[int]
-    ) -> Forked:
+    async def _fork(self, channel: socket.socket, message: str) -> Forked:
         for _ in range(CROWDED_TRIES):
             try:
-                return await self._forked(channel, message, descriptors)
+                return await self._forked(channel, message)
             except OSError as error:
                 if error.errno != errno.ETOOMANYREFS:
                     raise
             self._on_crowded()
             await asyncio.sleep(CROWDED_S)
-        return await self._forked(channel, message, descriptors)
+        return await self._forked(channel, message)
 
-    async def _forked(
-        self, channel: socket.socket, message: str, descriptors: Sequence[int]
-    ) -> Forked:
+    async def _forked(self, channel: socket.socket, message: str) -> Forked:
         # Watched before the request is sent: if watching failed later, the answer would stay unread
         # and be taken for that of the next request.
         with _readable(channel) as is_answered, contextlib.ExitStack() as failed:
-            ours, theirs = socket.socketpair()
+            ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             failed.callback(theirs.close)
             failed.callback(ours.close)
-            reader, writer = await asyncio.open_unix_connection(sock=ours, limit=LINE_LIMIT)
-            failed.callback(writer.close)
             status, of_server = os.pipe()
             failed.callback(os.close, status)
             try:
                 with theirs, _closed(of_server):
-                    given = (theirs.fileno(), *descriptors, of_server)
+                    given = (theirs.fileno(), of_server)
                     fork_server.ask(channel, message.encode(), given)
                 await is_answered.wait()
                 pid, descriptor = fork_server.answer(channel)
@@ -245,7 +215,7 @@ class ForkClient:
                 raise EOFError("the fork server has ended") from error
             failed.callback(os.close, descriptor)
             failed.callback(_kill, descriptor)
-            forked = Forked(pid, descriptor, status, reader, writer)
+            forked = Forked(pid, descriptor, status, ours)
             failed.pop_all()
             return forked
 

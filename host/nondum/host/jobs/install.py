@@ -12,7 +12,7 @@ from typing import Any
 
 from nondum.host.jobs import look
 from nondum.host.jobs.installed_component import InstalledComponent
-from nondum.host.jobs.look import Arguments, Report
+from nondum.host.jobs.table import Arguments, Report
 from nondum.host.trust import chain
 from nondum.sdk.codec.values import to_plain
 from nondum.sdk.errors import InstallFailed, Problem

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import distributions
 from pathlib import Path
@@ -21,6 +21,7 @@ from nondum.host.core.brief import brief
 from nondum.host.jobs import forked_trial
 from nondum.host.jobs.loose_goals import loose_goals
 from nondum.host.jobs.read_pace import paced
+from nondum.host.jobs.table import Arguments, Report
 from nondum.host.sandbox.helper import privileged
 from nondum.host.trust.chain import packed
 from nondum.host.trust.on_drives import trust_files_on
@@ -39,10 +40,6 @@ from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 from nondum.wheelhouse.wheels.dist_info import Needs
 from nondum.wheelhouse.wheels.wheel import Layout
-
-Report = Callable[[str, int, int], None]
-"""Phase, done, total."""
-Arguments = Mapping[str, Any]
 
 CERTIFICATES = "nondum-peers"
 """Folder of a drive with hosts' certificates."""

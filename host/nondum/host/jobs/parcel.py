@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.jobs import forked_trial, look
-from nondum.host.jobs.look import Arguments, Report
 from nondum.host.jobs.read_pace import paced
+from nondum.host.jobs.table import Arguments, Report
 from nondum.host.sandbox.helper import privileged
 from nondum.host.trust import chain
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem

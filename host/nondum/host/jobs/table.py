@@ -7,6 +7,7 @@ job need not wait for what others import.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -14,6 +15,21 @@ Arguments = Mapping[str, Any]
 Report = Callable[[str, int, int], None]
 """Phase, done, total."""
 Job = Callable[[Arguments, Report], Any]
+
+LONGEST = 16 * 1024 * 1024
+"""Bytes of what is asked of a job process, and of its answer."""
+PROGRESS = "progress"
+"""The event that a job is so far (`Progress`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is."""
+
+    phase: str
+    done: int
+    total: int
+
 
 JOBS: Mapping[str, str] = {
     "look": "nondum.host.jobs.look:look",

@@ -21,7 +21,7 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
 from nondum.host.core.state import Highwater, HostState
 from nondum.host.core.transitions import KEEPS_FOLDER
-from nondum.host.jobs.look import Arguments, Report
+from nondum.host.jobs.table import Arguments, Report
 from nondum.host.lifecycle import component_names, crash_attribution
 from nondum.host.lifecycle.turn import Turn
 from nondum.sdk.errors import NondumError

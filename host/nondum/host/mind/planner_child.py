@@ -1,8 +1,8 @@
 """The process that one planner runs in: `planner_child MODULE:CLASS MB DAEMON`, run by `-m`.
 
-It says what it speaks and handles, reads tasks from standard input and writes answers to standard
-output until the input ends. It is niced and limited in memory, and dies with the daemon. It is kept
-while idle, so what it imports is little.
+It says what it speaks and handles, and plans, one task after the other, until its link to the
+daemon ends (`nondum.host.rpc`). It is niced and limited in memory, and dies with the daemon. It is
+kept while idle, so what it imports is little.
 """
 
 from __future__ import annotations
@@ -11,26 +11,26 @@ import os
 import resource
 import sys
 import time
+from functools import partial
 from importlib import import_module
-from typing import Any, BinaryIO
+from typing import Any
 
 from nondum.host.mind import planner_wire as wire
+from nondum.host.rpc.channel import Channel, Tell, conversation
 from nondum.host.sandbox.levels import host_children
-from nondum.sdk.planner import Planner, TextPlanner
+from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.sdk.planner import GaveUp, Planner, TextPlanner
 
 NICENESS = 10
 
 
 def main(reference: str, memory_mb: int, daemon: int) -> int:
-    """Serve one planner, which an entry point refers to, until standard input ends."""
-    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what a planner prints must not get between the answers
+    """Serve one planner, which an entry point refers to, until the daemon is gone."""
+    channel = Channel(conversation(), wire.MAX_BYTES)
     _limit(memory_mb, daemon)
     module, _, name = reference.partition(":")
     planner: Planner | TextPlanner = getattr(import_module(module), name)()
-    answers.write(wire.frame(["ready", planner.speaks, sorted(planner.handles)]))
-    while (body := _read(requests)) is not None:
-        answers.write(wire.frame(_answer(planner, wire.unframed(body))))
+    channel.serve(partial(_do, planner))
     return 0
 
 
@@ -42,24 +42,18 @@ def _limit(memory_mb: int, daemon: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _answer(planner: Any, request: Any) -> list[Any]:
-    until_s, body = request  # by the clock that all processes of a machine share
-    task_of = wire.text_from_wire if planner.speaks == "pddl" else wire.task_from_wire
+def _do(planner: Any, verb: str, asked: Any, _tell: Tell) -> Any:
+    if verb == wire.DESCRIBE:
+        return [planner.speaks, sorted(planner.handles)]
+    until_s, body = asked  # by the clock that all processes of a machine share
     try:
-        task = task_of(wire.unframed(body))
+        task = wire.task_of(planner.speaks, body)
         return wire.answer_to_wire(planner.plan(task, max(0.0, until_s - time.monotonic())))
     except MemoryError:
-        return ["gave up", "it ran out of memory"]
+        return wire.answer_to_wire(GaveUp("it ran out of memory"))
     except Exception as error:  # whatever a planner raises is told to the host, and it may go on
-        return ["failed", f"{type(error).__name__}: {error}"]
-
-
-def _read(stream: BinaryIO) -> bytes | None:
-    head = stream.read(wire.LENGTH.size)
-    if len(head) < wire.LENGTH.size:
-        return None
-    (length,) = wire.LENGTH.unpack(head)
-    return stream.read(length)
+        text = f"{type(error).__name__}: {error}"
+        raise PlannerFailed(Problem("PLANNER_RAISED", text)) from error
 
 
 if __name__ == "__main__":

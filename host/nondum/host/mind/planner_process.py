@@ -9,15 +9,18 @@ import os
 import signal
 import sys
 import time
-from asyncio.subprocess import DEVNULL, PIPE, Process
+from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from nondum.host.mind import planner_wire as wire
 from nondum.host.mind.planner_folder import PlannerFolder
-from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.host.rpc.child_link import ChildLink
+from nondum.host.rpc.outcomes import unpacked
+from nondum.sdk.errors import LinkClosed, NondumError, PlannerFailed, Problem
 from nondum.sdk.planner import Answer, GaveUp, PlanText
+from nondum.transport import link_sockets
 
 START_S = 60.0
 """How long a planner may take to load: on a small computer that is just starting, a while."""
@@ -53,7 +56,7 @@ class PlannerProcess:
         self._folder = PlannerFolder(name, temporary)
         self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
         self._process: Process | None = None
-        self._is_ready = False
+        self._link: ChildLink | None = None
         self._going: set[asyncio.Future[Any]] = set()
         """Tasks that outlive a cancelled caller; `close` waits for them."""
         self._language = ""
@@ -77,11 +80,11 @@ class PlannerProcess:
         """
         async with self._lock:
             try:
-                process = await self._running()
+                link = await self._running()
                 if reason := self._refusal(request):
                     return GaveUp(reason)
                 async with asyncio.timeout(deadline_s + GRACE_S):
-                    return await self._asked(process, request, deadline_s)
+                    return await self._asked(link, request, deadline_s)
             except TimeoutError:
                 await self._kill()
                 return GaveUp(f"it overran its deadline of {deadline_s:g} s and was killed")
@@ -109,77 +112,83 @@ class PlannerProcess:
         return ""
 
     async def _asked(
-        self, process: Process, request: wire.Request, deadline_s: float
+        self, link: ChildLink, request: wire.Request, deadline_s: float
     ) -> Answer | PlanText:
-        assert process.stdin is not None  # started with pipes
         until_s = time.monotonic() + deadline_s
         if len(request.task.actions) > AT_ONCE:
             body = await asyncio.to_thread(request.body, self._language)
         else:
             body = request.body(self._language)
-        try:
-            process.stdin.write(wire.frame([until_s, body]))
-            await process.stdin.drain()
-        except ConnectionError as error:
-            raise self._failure("PLANNER_DIED", "it ended before it was asked") from error
-        return wire.answer_from_wire(await self._read(process))
+        return wire.answer_from_wire(await self._ask(link, wire.PLAN, [until_s, body]))
 
-    async def _running(self) -> Process:
-        if self._process is not None and self._process.returncode is None and self._is_ready:
-            return self._process
+    async def _running(self) -> ChildLink:
+        """The link to the child, which is started if there is none."""
+        is_there = self._process is not None and self._process.returncode is None
+        if self._link is not None and is_there and self._language:
+            return self._link
         await self._kill()
         folder = await self._to_its_end(asyncio.to_thread(self._folder.make))
-        self._process = await self._started(folder)
+        self._link = await self._started(folder)
         try:
             async with asyncio.timeout(START_S):
-                hello = await self._read(self._process)
+                told = await self._ask(self._link, wire.DESCRIBE, None)
         except (TimeoutError, PlannerFailed) as error:
             await self._kill()
             raise self._failure("PLANNER_START", "it does not start") from error
-        match hello:
-            case ["ready", str(language), [*handles]] if language in _LANGUAGES:
+        match told:
+            case [str(language), [*handles]] if language in _LANGUAGES:
                 self._language, self._handles = language, frozenset(map(str, handles))
             case _:
                 await self._kill()
-                raise self._failure("PLANNER_START", f"it speaks no language of this host: {hello}")
-        self._is_ready = True
-        return self._process
+                raise self._failure("PLANNER_START", f"it speaks no language of this host: {told}")
+        return self._link
 
-    async def _started(self, folder: Mapping[str, str]) -> Process:
-        """The child. Where this host has no process or descriptor left, others may plan."""
+    async def _started(self, folder: Mapping[str, str]) -> ChildLink:
+        """Start the child. Where this host has no process or descriptor left, others may plan."""
         module = "nondum.host.mind.planner_child"
         try:
-            return await asyncio.create_subprocess_exec(
-                *(sys.executable, "-P", "-m", module, self._reference),
-                *(str(self._memory_mb), str(os.getpid())),
-                stdin=PIPE,
-                stdout=PIPE,
-                stderr=DEVNULL,
-                env={**self._environment, **folder},
-                start_new_session=True,
-                cwd="/",
-            )
+            with contextlib.ExitStack() as failed:
+                ours, theirs = link_sockets()
+                failed.callback(ours.close)
+                with theirs:
+                    self._process = await asyncio.create_subprocess_exec(
+                        *(sys.executable, "-P", "-m", module, self._reference),
+                        *(str(self._memory_mb), str(os.getpid())),
+                        stdin=theirs.fileno(),
+                        stdout=DEVNULL,
+                        stderr=DEVNULL,
+                        env={**self._environment, **folder},
+                        start_new_session=True,
+                        cwd="/",
+                    )
+                link = ChildLink(ours, wire.MAX_BYTES)
+                failed.pop_all()
+            return link
         except OSError as error:
             log.warning("planner %s cannot be started: %s", self.name, error)
+            await self._kill()
             await self._to_its_end(asyncio.to_thread(self._folder.remove))
             raise self._failure("PLANNER_START", "it does not start") from error
 
-    async def _read(self, process: Process) -> object:
-        assert process.stdout is not None  # started with pipes
+    async def _ask(self, link: ChildLink, verb: str, value: object) -> object:
         try:
-            (length,) = wire.LENGTH.unpack(await process.stdout.readexactly(wire.LENGTH.size))
-            if length > wire.MAX_BYTES:
-                raise self._failure("PLANNER_ANSWER", f"an answer of {length} bytes")
-            return wire.unframed(await process.stdout.readexactly(length))
-        except asyncio.IncompleteReadError as error:
+            return unpacked(await link.ask(verb, value))
+        except LinkClosed as error:
             raise self._failure("PLANNER_DIED", "it ended without an answer") from error
+        except PlannerFailed:
+            raise
+        except NondumError as error:  # it broke the protocol
+            raise self._failure("PLANNER_ANSWER", error.problems[0].message) from error
 
     async def _kill(self) -> None:
-        process, self._process, self._is_ready = self._process, None, False
+        link, self._link = self._link, None
+        if link is not None:
+            link.close()
+        process, self._process, self._language = self._process, None, ""
         if process is None:
             return
         _end(process)
-        await self._to_its_end(process.communicate())  # also takes both pipes off the loop
+        await self._to_its_end(process.wait())
         await self._to_its_end(asyncio.to_thread(self._folder.remove))
 
     async def _to_its_end(self, awaited: Coroutine[Any, Any, _T]) -> _T:

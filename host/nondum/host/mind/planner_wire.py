@@ -1,33 +1,31 @@
-"""What host and planner child say to each other: length-prefixed msgpack over pipes."""
+"""Tasks and answers as plain data, for the link between the host and a planner child. Pure."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from threading import Lock
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import msgpack
 
-from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.sdk.errors import PlannerFailed, Problem, ProtocolViolation
+from nondum.sdk.packet_codec import PacketCodec
 from nondum.sdk.planner import (
-    AlreadyTrue,
     Answer,
     ConditionalEffect,
-    GaveUp,
     GroundAction,
     GroundTask,
     Layer,
     PddlTask,
-    Plan,
     PlanText,
     Rule,
-    Unsolvable,
 )
 
-LENGTH = struct.Struct(">I")
 MAX_BYTES = 256 * 1024 * 1024
 """No task that a child's memory limit admits is larger."""
+DESCRIBE, PLAN = "describe", "plan"
+"""What a child is asked: the language that it speaks and the features that it handles; a plan for a
+task, until a time."""
 
 TaskText: TypeAlias = Callable[[], PddlTask]
 """Makes a task's PDDL text, once a planner wants it."""
@@ -58,20 +56,6 @@ class Request:
             return task_to_wire(self.task)
         text = self._text()
         return [text.domain, text.problem]
-
-
-def frame(data: Any) -> bytes:
-    """One message with its length in front."""
-    body: bytes = msgpack.packb(data)
-    return LENGTH.pack(len(body)) + body
-
-
-def unframed(body: bytes) -> Any:
-    """The message of a frame. Raises `PlannerFailed` (PLANNER_ANSWER)."""
-    try:
-        return msgpack.unpackb(body, strict_map_key=True)
-    except (ValueError, msgpack.UnpackException) as error:
-        raise _invalid(f"not msgpack ({error})") from error
 
 
 def task_to_wire(task: GroundTask) -> list[Any]:
@@ -144,46 +128,28 @@ def _layer(
     )
 
 
-def text_from_wire(data: Any) -> PddlTask:
-    """Make PDDL text of a request's body; trusts it."""
-    return PddlTask(*data)
+def task_of(language: str, body: bytes) -> GroundTask | PddlTask:
+    """The task in the body of a request; trusts it."""
+    data = msgpack.unpackb(body)
+    return PddlTask(*data) if language == "pddl" else task_from_wire(data)
 
 
-def answer_to_wire(answer: Answer | PlanText) -> list[Any]:
+_KINDS = (*get_args(Answer), PlanText)
+_ANSWERS: PacketCodec[Answer | PlanText] = PacketCodec(_KINDS)
+
+
+def answer_to_wire(answer: Answer | PlanText) -> Sequence[Any]:
     """A planner's answer as plain data. Raises `TypeError` for anything that is not one."""
-    match answer:
-        case Plan(steps, cost):
-            return ["plan", list(steps), cost]
-        case PlanText(steps=names):
-            return ["plan text", list(names)]
-        case AlreadyTrue():
-            return ["already true"]
-        case Unsolvable(proof, facts):
-            return ["unsolvable", proof, list(facts)]
-        case GaveUp(why):
-            return ["gave up", why]
-    raise TypeError(
-        f"a planner answers with Plan, PlanText, AlreadyTrue, Unsolvable or GaveUp: {answer!r}"
-    )
+    if type(answer) not in _KINDS:
+        known = ", ".join(kind.__name__ for kind in _KINDS)
+        raise TypeError(f"a planner answers with one of {known}, not with {answer!r}")
+    return _ANSWERS.fields(answer)
 
 
-def answer_from_wire(data: Any) -> Answer | PlanText:
+def answer_from_wire(data: object) -> Answer | PlanText:
     """Check an answer and make the value of it. Raises `PlannerFailed` (PLANNER_ANSWER)."""
-    match data:
-        case ["plan", [*steps], int(cost)] if all(type(step) is int for step in steps):
-            return Plan(tuple(steps), cost)
-        case ["plan text", [*names]] if all(isinstance(name, str) for name in names):
-            return PlanText(tuple(names))
-        case ["already true"]:
-            return AlreadyTrue()
-        case ["unsolvable", str(proof), [*facts]] if all(isinstance(f, str) for f in facts):
-            return Unsolvable(proof, tuple(facts))
-        case ["gave up", str(why)]:
-            return GaveUp(why)
-        case ["failed", str(why)]:
-            raise PlannerFailed(Problem("PLANNER_RAISED", why))
-    raise _invalid(f"not an answer: {str(data)[:100]}")
-
-
-def _invalid(message: str) -> PlannerFailed:
-    return PlannerFailed(Problem("PLANNER_ANSWER", message))
+    try:
+        return _ANSWERS.message(data)
+    except ProtocolViolation as violation:
+        text = f"not an answer: {violation.problems[0].message}"
+        raise PlannerFailed(Problem("PLANNER_ANSWER", text)) from violation

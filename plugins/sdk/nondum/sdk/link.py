@@ -9,14 +9,15 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-import os
 import socket
 from collections import deque
 from collections.abc import Awaitable, Callable, Generator, Sequence
 from typing import Any, TypeAlias
 
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
+from nondum.sdk.outbox import Outbox
 from nondum.sdk.packets import Handle, Packets, SocketPackets, discard
+from nondum.sdk.pieces import Joined, cut
 from nondum.sdk.wire import (
     MAX_PACKET,
     Body,
@@ -87,6 +88,7 @@ class Link:
         credit: int = CREDIT,
         *,
         max_handles: int = 0,
+        limit: int = MAX_PACKET,
     ) -> None:
         """Own `sock` and begin to read.
 
@@ -94,21 +96,22 @@ class Link:
         answers with its result, its `NondumError`, or HALTED when it is cancelled.
         `on_event(name, body, call_id)` is called at once. `on_closed` is called once when the other
         end is gone, and after `on_violation` when it broke the protocol; not after `close`.
-        A packet with more than `max_handles` descriptors is a violation.
+        A packet with more than `max_handles` descriptors is a violation, and a message of more than
+        `limit` bytes. Where messages may be longer than a packet, all travel in pieces.
         """
         self._on_request, self._on_event = on_request, on_event
         self._on_closed, self._on_violation = on_closed, on_violation
         self._credit, self._free, self._max_handles = credit, credit, max_handles
+        self._limit, self._joined = limit, Joined(limit) if limit > MAX_PACKET else None
         self._credit_waiters: deque[asyncio.Future[None]] = deque()
         self._ids = itertools.count(1)
         self._pending: dict[int, Pending] = {}
         self._running: dict[int, asyncio.Task[None]] = {}
-        self._waiting: deque[tuple[bytes, tuple[Handle, ...]]] = deque()
-        self._waiting_bytes = 0
         self._greeting: asyncio.Future[Hello | Welcome] = asyncio.get_running_loop().create_future()
         self.is_closed = False
         is_socket = isinstance(sock, socket.socket)
         self._packets: Packets = SocketPackets(sock, MAX_PACKET) if is_socket else sock  # type: ignore[assignment,arg-type]  # narrowed by is_socket
+        self._outbox = Outbox(self._packets)
         self._packets.open(self._receive, self._lose)
 
     async def request(self, verb: str, body: Body, fds: Sequence[Handle] = ()) -> dict[str, Any]:
@@ -192,38 +195,25 @@ class Link:
         if not self._greeting.done():
             self._greeting.set_exception(_closed())
             self._greeting.exception()  # mark as seen: no task may be waiting
-        while self._waiting:
-            discard(self._waiting.popleft()[1])
+        self._outbox.clear()
 
     def _send(self, message: WireMessage, handles: tuple[Handle, ...] = ()) -> None:
-        data = encode(message)
-        if not self._waiting and self._packets.send(data, handles):
-            return
-        self._waiting_bytes += len(data)
-        if len(self._waiting) >= MAX_WAITING or self._waiting_bytes > MAX_WAITING_BYTES:
-            told = f"{len(self._waiting)} packets wait to be read"
+        data = encode(message, self._limit)
+        if len(self._outbox) >= MAX_WAITING or self._outbox.bytes > MAX_WAITING_BYTES:
+            told = f"{len(self._outbox)} packets wait to be read"
             self._violate(Problem("LINK_CONGESTED", told))
             return
-        kept = tuple(os.dup(h) if isinstance(h, int) else h for h in handles)
-        self._waiting.append((data, kept))
-        if len(self._waiting) == 1:
-            self._packets.when_writable(self._flush)
-
-    def _flush(self) -> None:
-        while self._waiting:
-            data, handles = self._waiting[0]
-            if not self._packets.send(data, handles):
-                self._packets.when_writable(self._flush)
-                return
-            self._waiting.popleft()
-            self._waiting_bytes -= len(data)
-            for handle in handles:
-                if isinstance(handle, int):
-                    os.close(handle)  # the duplicate that waited; the other end has its own
+        for packet in (data,) if self._joined is None else cut(data):
+            self._outbox.send(packet, handles)
 
     def _receive(self, data: bytes, handles: tuple[Handle, ...]) -> None:
         try:
-            message = decode(data)
+            if self._joined is not None:
+                if (joined := self._joined.add(data)) is None:
+                    discard(handles)
+                    return
+                data = joined
+            message = decode(data, self._limit)
             if len(handles) > (self._max_handles if isinstance(message, Request) else 0):
                 raise ProtocolViolation(
                     Problem("PACKET_DESCRIPTORS", "a packet carries unexpected descriptors")

@@ -99,18 +99,18 @@ WireMessage: TypeAlias = Hello | Welcome | Request | Reply | Failure | Event | C
 _PACKETS: PacketCodec[WireMessage] = PacketCodec(get_args(WireMessage))
 
 
-def encode(message: WireMessage) -> bytes:
+def encode(message: WireMessage, limit: int = MAX_PACKET) -> bytes:
     """Make the packet of a message.
 
     Raises `ProtocolViolation` for what the other end would refuse (too long, too deep, NaN) and
     `TypeError` for values that are no plain data.
     """
-    return pack(_PACKETS.fields(message))
+    return pack(_PACKETS.fields(message), limit)
 
 
-def decode(data: bytes | memoryview) -> WireMessage:
+def decode(data: bytes | memoryview, limit: int = MAX_PACKET) -> WireMessage:
     """Read a packet. Raises `ProtocolViolation` for anything that is not one exact message."""
-    return _PACKETS.message(unpack(data))
+    return _PACKETS.message(unpack(data, limit))
 
 
 def pack(value: Any, limit: int = MAX_PACKET) -> bytes:

@@ -10,5 +10,5 @@ from nondum.host.jobs import fork_server
 
 if __name__ == "__main__":
     if fork_server.serve(socket.socket(fileno=int(sys.argv[2]))):
-        while os.read(1, 1 << 16):
+        while os.read(0, 1 << 16):
             pass

@@ -109,6 +109,7 @@ async def test_what_a_bridge_prints_goes_where_its_errors_go() -> None:
     async with forks() as client, bridge_of(client) as bridge, bridge.kept():
         held = Path(f"/proc/{bridge.pid}/fd")
         assert (held / "1").readlink() == (held / "2").readlink()
+        assert (held / "0").readlink() == Path("/dev/null"), "nor does it inherit its link"
 
 
 async def test_bridge_dies_with_its_fork_server_and_starts_again() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import encodings.ascii  # noqa: F401  # the users of these tests may not look where it is
-import json
 import os
 import pickle
 import pwd
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from tests.host.sandbox.helper.replies import code
 from tests.kit.descriptors import descriptors_left
 from tests.kit.disk_images import make_ext4
 from tests.kit.golden import Golden
@@ -36,6 +36,15 @@ from nondum.host.sandbox.helper.server import MOST_CHILDREN, Server, answer
 from nondum.host.sandbox.helper.service import Service
 from nondum.host.sandbox.helper.stop_key import EV_KEY, EVENT, PressesOfDevice
 from nondum.sdk.errors import NondumError
+from nondum.sdk.wire import (
+    MAX_PACKET,
+    Cancel,
+    Event,
+    Reply,
+    Request,
+    decode,
+    encode,
+)
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="the helper is root's")
 SERVED = pwd.getpwnam("daemon")
@@ -49,6 +58,10 @@ REMOVED = (
 )
 """What the kernel writes."""
 START = 'export LISTEN_PID=$$ LISTEN_FDS=1; exec "$@"'
+
+
+def asking(verb: str, body: dict[str, Any]) -> bytes:
+    return encode(Request(requests.CALL, verb, body))
 
 
 @dataclass
@@ -135,23 +148,18 @@ def as_user(uid: int, work: Callable[[], _R]) -> _R:
     return result
 
 
-def raw(helper: Helper, *packets: bytes, fds: tuple[int, ...] = ()) -> dict[str, Any]:
-    """Send packets as the served user, with descriptors; the answer, if any."""
+def raw(helper: Helper, *packets: bytes, fds: tuple[int, ...] = ()) -> str:
+    """Send packets as the served user, with descriptors; the code that is answered, if any."""
 
-    def ask() -> dict[str, Any]:
+    def ask() -> str:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asked:
             asked.settimeout(10)
             asked.connect(str(helper.socket))
             for packet in packets:
                 socket.send_fds(asked, [packet], list(fds))
-            answer = asked.recv(requests.ANSWER_BYTES)
-            return dict(json.loads(answer)) if answer else {}
+            return code(decode(asked.recv(MAX_PACKET)))
 
     return served(ask)
-
-
-def code(answer: dict[str, Any]) -> str:
-    return str(answer["problems"][0]["code"]) if "problems" in answer else ""
 
 
 def test_strangers_are_not_served(helper: Helper) -> None:
@@ -164,20 +172,20 @@ def test_strangers_are_not_served(helper: Helper) -> None:
     "packet",
     [
         pytest.param(b"\xff" * 300, id="garbage"),
-        pytest.param(b"[" * 1000, id="deep"),
+        pytest.param(b"\x91" * 1000, id="deep"),
         pytest.param(b"x" * 60_000, id="long"),
-        pytest.param(b'{"verb":"Unmount","drive":"../..","use":"read"}', id="path"),
-        pytest.param(b'{"verb":"Mount","device":"sda","diskseq":1}', id="short"),
+        pytest.param(asking("Unmount", {"drive": "../..", "use": "read"}), id="path"),
+        pytest.param(asking("Mount", {"device": "sda", "diskseq": 1}), id="short"),
+        pytest.param(encode(Cancel(1)), id="no request"),
     ],
 )
 def test_nonsense_is_refused_in_words(helper: Helper, packet: bytes) -> None:
-    assert code(raw(helper, packet)) == "HELPER_REFUSED"
+    assert raw(helper, packet) == "HELPER_REFUSED"
 
 
 def test_descriptors_are_refused_and_not_kept(helper: Helper) -> None:
     read, write = os.pipe()
-    answer = raw(helper, requests.encode(requests.ListCgroups()), fds=(write,))
-    assert code(answer) == "HELPER_REFUSED"
+    assert raw(helper, requests.encode(requests.ListCgroups()), fds=(write,)) == "HELPER_REFUSED"
     os.close(write)
     assert os.read(read, 1) == b"", "the helper holds no copy"
     os.close(read)
@@ -229,7 +237,7 @@ def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
         for one in asked:
             try:
                 one.send(requests.encode(requests.ListCgroups()))
-                said.append(code(json.loads(one.recv(requests.ANSWER_BYTES))))
+                said.append(code(decode(one.recv(MAX_PACKET))))
             except OSError:
                 said.append("hung up")
         return said
@@ -325,7 +333,7 @@ def test_drive_is_mounted_where_the_helper_says_and_let_go(helper: Helper, drive
 def test_other_insertion_and_fixed_disks_are_not_mounted(helper: Helper, drive: Path) -> None:
     for device, number in ((drive.name, 1), ("vda", None), ("sda1", 3)):
         request = requests.Mount(device, number, "ext4", "read")
-        assert code(raw(helper, requests.encode(request))) == "HELPER_REFUSED"
+        assert raw(helper, requests.encode(request)) == "HELPER_REFUSED"
     assert not (helper.run / "mounts").exists() or not os.listdir(helper.run / "mounts")  # noqa: PTH208
 
 
@@ -410,25 +418,25 @@ def test_presses_of_the_stop_key_are_told_until_it_is_gone() -> None:
     )
     with ours, theirs:
         ours.send(requests.encode(requests.ListenToStopKey()))
-        told: list[dict[str, Any]] = []
+        told: list[Reply] = []
         serving = threading.Thread(target=lambda: told.append(answer(theirs, service)))
         serving.start()
-        assert json.loads(ours.recv(100)) == {"down": True}
+        assert decode(ours.recv(100)) == Event("listening", 1, {"down": True})
         os.write(keyboard, EVENT.pack(0, 0, EV_KEY, 119, 1))
-        assert json.loads(ours.recv(100)) == {"pressed": 1}
+        assert decode(ours.recv(100)) == Event("pressed", 1, {"times": 1})
         os.close(keyboard)
         serving.join()
-    assert [problem["code"] for problem in told[0]["problems"]] == ["HELPER_FAILED"]
+    assert [code(reply) for reply in told] == ["HELPER_FAILED"]
 
 
-@pytest.mark.parametrize("said", [b"", b'{"error":"InstallFailed","problems":[]}'])
+@pytest.mark.parametrize("said", [b"", encode(Reply(1, {})), b"nonsense"])
 def test_helper_that_listens_no_more_is_noticed(said: bytes) -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.settimeout(0)
     with ours, theirs:
         presses = PressesOfHelper(ours, is_down=False)
         assert presses.read() == 0
-        theirs.send(b'{"pressed":2}')
+        theirs.send(encode(Event("pressed", 1, {"times": 2})))
         assert presses.read() == 2
         theirs.send(said) if said else theirs.close()
         with pytest.raises(ConnectionResetError):
@@ -512,4 +520,22 @@ def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:
         with pytest.raises(NondumError) as silent:
             HelperClient(tmp_path / "s").ask(requests.ListCgroups())
         hanging_up.join()
+    assert silent.value.code == "HELPER_SILENT"
+
+
+def test_helper_that_says_something_else_is_told(tmp_path: Path) -> None:
+    def tell() -> None:
+        connection, _ = listening.accept()
+        with connection:
+            connection.recv(MAX_PACKET)
+            connection.send(encode(Event("pressed", requests.CALL, {"times": 1})))
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+        telling = threading.Thread(target=tell)
+        telling.start()
+        with pytest.raises(NondumError) as silent:
+            HelperClient(tmp_path / "s").ask(requests.ListCgroups())
+        telling.join()
     assert silent.value.code == "HELPER_SILENT"

@@ -18,7 +18,7 @@ from typing import Any
 from nondum.host.jobs.fork_client import ForkClient, Forked
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
 from nondum.sdk.wire_fields import read_problem
-from nondum.transport import WorkerLink, link_sockets
+from nondum.transport import WorkerLink
 from nondum.transport.peers.keys import PeerKey
 
 IDLE_S = 10.0
@@ -218,17 +218,12 @@ class Bridge:
         if self._is_closed:
             raise LinkClosed(Problem("LINK_CLOSED", "the bridge is closed"))
         body = {"interfaces": list(self._interfaces), "port": self._port}
-        ours, theirs = link_sockets()
         try:
-            with theirs:
-                process = await self._forks.fork(NAME, FORK_S, (theirs.fileno(),))
-        except BaseException as error:
-            ours.close()
-            if isinstance(error, OSError | EOFError):  # a TimeoutError is an OSError
-                raise _not_started(str(error) or f"no process for {FORK_S:g} s") from error
-            raise
+            process = await self._forks.fork(NAME, FORK_S)
+        except (OSError, EOFError) as error:  # a TimeoutError is an OSError
+            raise _not_started(str(error) or f"no process for {FORK_S:g} s") from error
         link = WorkerLink(
-            ours,
+            process.conversation,
             on_event=self._on_event,
             on_closed=lambda: self._on_closed(link),
             on_violation=lambda _: None,

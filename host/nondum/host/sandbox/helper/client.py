@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import logging
 import os
 import re
@@ -15,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.feedback_state import State
+from nondum.host.rpc.outcomes import unpacked
 from nondum.host.sandbox.cgroups.limits import CgroupLimits, Usage
 from nondum.host.sandbox.helper import requests, worker_users
 from nondum.host.sandbox.helper.requests import Request
-from nondum.sdk import errors
-from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.sdk.errors import InstallFailed, NondumError, Problem, ProtocolViolation
+from nondum.sdk.wire import MAX_PACKET, Event, Reply, WireMessage, decode
 
 SOCKET = Path("/run/nondum-helper/helper.sock")
 MOUNTS = Path("/run/nondum-helper/mounts")
@@ -103,7 +103,11 @@ class HelperClient:
             asked.settimeout(WAIT_S)
             said = self._asked(asked, requests.ListenToStopKey())
             asked.settimeout(0)
-            return PressesOfHelper(asked, is_down=said["down"])
+            match said:
+                case Event(requests.LISTENING, body={"down": bool(is_down)}):
+                    return PressesOfHelper(asked, is_down=is_down)
+            _result(said)
+            raise _silent("it does not listen")
         except BaseException:
             asked.close()
             raise
@@ -122,10 +126,10 @@ class HelperClient:
     def _ask(self, request: Request, *descriptors: int) -> dict[str, Any]:
         with _opened() as asked:
             asked.settimeout(WAIT_S)
-            return self._asked(asked, request, *descriptors)
+            return _result(self._asked(asked, request, *descriptors))
 
-    def _asked(self, asked: socket.socket, request: Request, *descriptors: int) -> dict[str, Any]:
-        """Ask over a socket; the first answer."""
+    def _asked(self, asked: socket.socket, request: Request, *descriptors: int) -> WireMessage:
+        """Ask over a socket; what comes first."""
         try:
             _connect(asked, self._path)
             # Who is turned away is answered before the question is heard.
@@ -136,12 +140,7 @@ class HelperClient:
             raise _silent(str(error)) from error
         if not answer:
             raise _silent("it hung up")
-        said: dict[str, Any] = json.loads(answer)
-        if "problems" in said:
-            kind = getattr(errors, said["error"], NondumError)
-            failure: NondumError = kind(*(Problem(**problem) for problem in said["problems"]))
-            raise failure
-        return said
+        return decode(answer)
 
 
 class PressesOfHelper:
@@ -158,13 +157,14 @@ class PressesOfHelper:
     def read(self) -> int:
         """How many presses have come. Raises `OSError` when the helper tells no more."""
         try:
-            data = self._connection.recv(requests.ANSWER_BYTES)
+            data = self._connection.recv(MAX_PACKET)
         except BlockingIOError:
             return 0
-        said: dict[str, Any] = json.loads(data) if data else {}
-        if "pressed" not in said:
-            raise ConnectionResetError("the helper does not listen any more")
-        return int(said["pressed"])
+        with contextlib.suppress(ProtocolViolation):
+            match decode(data):
+                case Event(requests.PRESSED, body={"times": int(times)}):
+                    return times
+        raise ConnectionResetError("the helper does not listen any more")
 
     def close(self) -> None:
         """Hang up."""
@@ -255,9 +255,17 @@ def _connect(asked: socket.socket, path: Path) -> None:
 
 def _received(asked: socket.socket) -> bytes:
     try:
-        return asked.recv(requests.ANSWER_BYTES)
+        return asked.recv(MAX_PACKET)
     except ConnectionResetError:  # the question was not read, which is told first
-        return asked.recv(requests.ANSWER_BYTES)
+        return asked.recv(MAX_PACKET)
+
+
+def _result(said: WireMessage) -> dict[str, Any]:
+    """What was asked for. Raises what the helper raised, `InstallFailed` (HELPER_SILENT)."""
+    if isinstance(said, Reply):
+        result: dict[str, Any] = unpacked(said.body)
+        return result
+    raise _silent("it says something else")
 
 
 def _is_open(node: os.stat_result) -> bool:

@@ -1,4 +1,4 @@
-"""What the helper can be asked, as values and as bytes: a packet of JSON for each. Pure.
+"""What the helper can be asked, as values and as bytes: a request of a worker link for each. Pure.
 
 No request carries a path: drives are named by kernel name and insertion number, folders of devices
 by component, cgroups by their own names, and lamps not at all. Everything else is refused before
@@ -7,7 +7,6 @@ anything is done.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,13 +15,17 @@ from typing import Annotated, TypeAlias, get_args
 from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.cgroups.limits import NAME as CGROUP_NAME
 from nondum.host.sandbox.cgroups.limits import CgroupLimits
+from nondum.sdk import wire
 from nondum.sdk.codec.checks import Bounds, matching
 from nondum.sdk.codec.values import from_plain, to_plain
-from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
 
 MAX_BYTES = 1024
 """Of a request."""
-ANSWER_BYTES = 64 * 1024
+CALL = 1
+"""The number of the one request of a connection."""
+LISTENING, PRESSED = "listening", "pressed"
+"""Events that belong to `ListenToStopKey`."""
 
 DEVICE = re.compile(r"[a-z][a-z0-9]{1,31}")
 DRIVE = re.compile(r"[a-z][a-z0-9]{1,31}(-[0-9]{1,19})?")
@@ -184,8 +187,8 @@ class RemoveCgroup:
 class ListenToStopKey:
     """Tell each press of the key that root's configuration names, until the caller hangs up.
 
-    The answer is whether it is `down` already; then a packet with how often it was `pressed` comes
-    each time.
+    The event `listening` tells whether it is `down` already; then `pressed` comes each time, with
+    how many `times` it was.
     """
 
 
@@ -216,28 +219,25 @@ _VERBS: Mapping[str, type[Request]] = {kind.__name__: kind for kind in get_args(
 def encode(request: Request) -> bytes:
     """A request as it travels.
 
-    >>> encode(Unmount("sdb1-7", "read"))
-    b'{"verb":"Unmount","drive":"sdb1-7","use":"read"}'
+    >>> wire.decode(encode(Unmount("sdb1-7", "read")))
+    Request(id=1, verb='Unmount', body={'drive': 'sdb1-7', 'use': 'read'})
     """
-    body = {"verb": type(request).__name__, **to_plain(request)}
-    return json.dumps(body, separators=(",", ":")).encode()
+    return wire.encode(wire.Request(CALL, type(request).__name__, to_plain(request)))
 
 
 def parse(data: bytes) -> Request:
     """The request in a packet. Raises `NondumError` (HELPER_REFUSED)."""
-    if len(data) > MAX_BYTES:
-        raise refused(f"a request is longer than {MAX_BYTES} bytes")
     try:
-        body = json.loads(data)
-    except (ValueError, RecursionError):
-        raise refused("a request is not JSON") from None
-    if not isinstance(body, dict) or not isinstance(body.get("verb"), str):
-        raise refused("a request has no verb")
-    kind = _VERBS.get(body.pop("verb"))
+        asked = wire.decode(data, MAX_BYTES)
+    except ProtocolViolation as violation:
+        raise refused(violation.problems[0].message) from None
+    if not isinstance(asked, wire.Request) or asked.id != CALL:
+        raise refused("a connection is for one request")
+    kind = _VERBS.get(asked.verb)
     if kind is None:
         raise refused("there is no such verb")
     try:
-        request = from_plain(kind, body, kind.__name__)
+        request = from_plain(kind, asked.body, kind.__name__)
         if isinstance(request, LimitCgroup):
             _ = request.limits
     except ValueError as error:

@@ -6,7 +6,6 @@ What a drive makes hang, hangs one child; the others go on.
 
 from __future__ import annotations
 
-import json
 import os
 import select
 import signal
@@ -15,13 +14,14 @@ import struct
 import sys
 from collections.abc import Callable
 from contextlib import closing
-from typing import Any
 
+from nondum.host.rpc import outcomes
 from nondum.host.sandbox.helper import removals, requests
-from nondum.host.sandbox.helper.requests import refused
+from nondum.host.sandbox.helper.requests import CALL, LISTENING, PRESSED, refused
 from nondum.host.sandbox.helper.service import Service
 from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.sdk.wire import Body, Event, Reply, WireMessage, encode
 
 IDLE_S = 30.0
 """Without a question for so long, the helper ends; systemd keeps listening."""
@@ -88,9 +88,9 @@ class Server:
             return
         with connection:
             if _peer(connection) != self._service.uid:
-                _say(connection, _failure(refused("this user is not served")))
+                _say(connection, _answer(refused("this user is not served")))
             elif len(self._children) >= MOST_CHILDREN:
-                _say(connection, _failure(_busy()))
+                _say(connection, _answer(_busy()))
             else:
                 self._start(connection)
 
@@ -100,7 +100,7 @@ class Server:
         try:
             self._children.add(_child(lambda: self._answer(connection)))
         except OSError:
-            _say(connection, _failure(_busy()))
+            _say(connection, _answer(_busy()))
 
     def _answer(self, connection: socket.socket) -> None:
         self._listening.close()
@@ -115,7 +115,7 @@ class Server:
             self._children.discard(pid)
 
 
-def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
+def answer(connection: socket.socket, service: Service) -> Reply:
     """Take one question and do what it asks; the answer, or what is wrong."""
     brought: list[int] = []
     try:
@@ -128,29 +128,29 @@ def answer(connection: socket.socket, service: Service) -> dict[str, Any]:
             raise refused(f"{type(request).__name__} came with {len(brought)} descriptors")
         if isinstance(request, requests.ListenToStopKey):
             return _listen(connection, service)
-        return service.serve(request, *brought)
+        return Reply(CALL, outcomes.packed(service.serve(request, *brought)))
     except NondumError as error:
-        return _failure(error)
+        return _answer(error)
     except OSError as error:
         text = f"{error.strerror or error} ({error.filename})" if error.filename else str(error)
-        return _failure(InstallFailed(Problem("HELPER_FAILED", text, fix=_LOOK)))
+        return _answer(InstallFailed(Problem("HELPER_FAILED", text, fix=_LOOK)))
     finally:
         for descriptor in brought:
             os.close(descriptor)
 
 
-def _listen(connection: socket.socket, service: Service) -> dict[str, Any]:
+def _listen(connection: socket.socket, service: Service) -> Reply:
     """Tell presses of the stop key until the other end hangs up, or its device is gone."""
     signal.alarm(0)  # that may be long
     with closing(service.stop_key()) as presses:
-        _say(connection, {"down": presses.is_down_at_first})
+        _tell(connection, LISTENING, {"down": presses.is_down_at_first})
         while True:
             sources: list[socket.socket | PressesOfDevice] = [connection, presses]
             ready, _, _ = select.select(sources, [], [])
             if connection in ready:
-                return {}
+                return Reply(CALL, outcomes.packed({}))
             if pressed := presses.read():
-                _say(connection, {"pressed": pressed})
+                _tell(connection, PRESSED, {"times": pressed})
 
 
 def _child(work: Callable[[], None]) -> int:
@@ -174,16 +174,19 @@ def _peer(connection: socket.socket) -> int:
     return uid
 
 
-def _say(connection: socket.socket, said: dict[str, Any]) -> None:
+def _tell(connection: socket.socket, event: str, body: Body) -> None:
+    _say(connection, Event(event, CALL, body))
+
+
+def _say(connection: socket.socket, message: WireMessage) -> None:
     try:
-        connection.send(json.dumps(said, separators=(",", ":")).encode(), socket.MSG_DONTWAIT)
+        connection.send(encode(message), socket.MSG_DONTWAIT)
     except OSError:  # the client does not wait for it
         return
 
 
-def _failure(error: NondumError) -> dict[str, Any]:
-    problems = [problem.to_dict() for problem in error.problems]
-    return {"error": type(error).__name__, "problems": problems}
+def _answer(error: NondumError) -> Reply:
+    return Reply(CALL, outcomes.refused(error))
 
 
 def _busy() -> InstallFailed:

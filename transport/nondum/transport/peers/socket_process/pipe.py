@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import socket
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.outbox import Outbox
 from nondum.sdk.packets import Handle, SocketPackets
 from nondum.sdk.wire import pack, unpack
 from nondum.transport.peers.messages import MAX_MESSAGE
@@ -47,39 +47,27 @@ class Pipe:
         """
         self._on_packet, self._on_closed, self._on_drained = on_packet, on_closed, on_drained
         self._most_waiting = most_waiting
-        self._waiting: deque[bytes] = deque()
-        self._waiting_bytes = 0
         self._was_crowded = False
         self._packets = SocketPackets(sock, LONGEST, max_handles=0)
+        self._outbox = Outbox(self._packets, self._drained)
         self._packets.open(self._receive, on_closed)
 
     @property
     def is_crowded(self) -> bool:
         """Whether much waits for the other end."""
-        return self._waiting_bytes > self._most_waiting
+        return self._outbox.bytes > self._most_waiting
 
     def send(self, *fields: Any) -> None:
         """Send a packet, at once or later; to an end that is gone, not at all."""
-        data = pack(fields, LONGEST)
-        if not self._waiting and self._packets.send(data):
-            return
-        self._waiting.append(data)
-        self._waiting_bytes += len(data)
+        self._outbox.send(pack(fields, LONGEST))
         self._was_crowded |= self.is_crowded
-        if len(self._waiting) == 1:
-            self._packets.when_writable(self._flush)
 
     def close(self) -> None:
         """Let go of it; what waits is lost."""
-        self._waiting.clear()
+        self._outbox.clear()
         self._packets.close()
 
-    def _flush(self) -> None:
-        while self._waiting:
-            if not self._packets.send(self._waiting[0]):
-                self._packets.when_writable(self._flush)
-                return
-            self._waiting_bytes -= len(self._waiting.popleft())
+    def _drained(self) -> None:
         if self._was_crowded:
             self._was_crowded = False
             self._on_drained()
