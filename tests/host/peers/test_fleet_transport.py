@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Mapping
+from typing import NoReturn
 
 import pytest
 from tests.transport.peers.hosts import Servant
@@ -20,8 +21,12 @@ pytestmark = pytest.mark.anyio
 ROUTER = parse('[router]\nendpoints = ["tcp/127.0.0.1:7447"]\n', "host.toml", HostConfig())
 
 
+def unused(what: object) -> NoReturn:
+    raise AssertionError(what)
+
+
 def mine(member: FleetMember) -> Fleet:
-    raise AssertionError(member)
+    unused(member)
 
 
 @hookimpl
@@ -45,7 +50,7 @@ def extended(fleets: Callable[[HostConfig], Mapping[str, MakeFleet]]) -> Extensi
 async def test_hosts_are_linked_one_by_one_where_no_router_is_named() -> None:
     make = chosen(Extensions([]), HostConfig())
     identity = Identity("rover", HostKeys.generate())
-    fleet = make(FleetMember(identity, Trust(), Servant(), pytest.fail, lambda _: pytest.fail()))
+    fleet = make(FleetMember(identity, Trust(), Servant(), unused, unused))
     assert isinstance(fleet, Mesh)
     assert fleet.key == identity.key
     await fleet.close()
