@@ -206,7 +206,8 @@ class PeerServices:
         )
         compute = await asyncio.to_thread(_compute, config)
         placement = Placement(
-            *(config, folders, children, catalogue, emit, lambda: made.fleet),
+            *(config, folders, children, catalogue, emit),
+            lambda: made.fleet,
             pins=await Pins.open(folders.root / "places.json"),
             compute=compute,
             confinement=workers.launcher.level,
