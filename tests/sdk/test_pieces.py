@@ -10,6 +10,9 @@ from nondum.sdk.errors import ProtocolViolation
 from nondum.sdk.pieces import Joined, cut
 from nondum.sdk.wire import MAX_PACKET
 
+LONGEST = b"a" * (MAX_PACKET - 1)
+"""What a packet has of a message."""
+
 
 @given(st.lists(st.integers(1, 3 * MAX_PACKET), min_size=1, max_size=4))
 def test_messages_arrive_one_after_the_other(lengths: list[int]) -> None:
@@ -24,13 +27,15 @@ def test_messages_arrive_one_after_the_other(lengths: list[int]) -> None:
     [
         pytest.param([b"\2a"], "PACKET_MALFORMED", id="another mark"),
         pytest.param([b""], "PACKET_MALFORMED", id="no mark"),
-        pytest.param([b"\1" + b"a" * 11], "PACKET_TOO_LONG", id="too long"),
-        pytest.param([b"\0" + b"a" * 9, b"\0aa"], "PACKET_TOO_LONG", id="too long together"),
+        pytest.param([b"\0"], "PACKET_MALFORMED", id="not the last, and empty"),
+        pytest.param([b"\0" + LONGEST[1:]], "PACKET_MALFORMED", id="not the last, and short"),
+        pytest.param([b"\1" + LONGEST + b"aa"], "PACKET_TOO_LONG", id="too long"),
+        pytest.param([b"\0" + LONGEST, b"\1aa"], "PACKET_TOO_LONG", id="too long together"),
     ],
 )
 def test_what_is_no_piece_is_refused(packets: list[bytes], code: str) -> None:
-    joined = Joined(10)
-    assert joined.add(b"\1" + b"a" * 10) == b"a" * 10
+    joined = Joined(len(LONGEST) + 1)
+    assert joined.add(b"\1" + LONGEST) == LONGEST
     with pytest.raises(ProtocolViolation) as violation:
         for packet in packets:
             joined.add(packet)

@@ -42,6 +42,8 @@ class Joined:
         self._bytes += len(piece)
         if mark not in (_MORE, _LAST):
             raise ProtocolViolation(Problem("PACKET_MALFORMED", f"no piece begins with {mark!r}"))
+        if mark == _MORE and len(piece) != _BYTES:  # so that no message has pieces without end
+            raise ProtocolViolation(Problem("PACKET_MALFORMED", "only the last piece is shorter"))
         if self._bytes > self._limit:
             told = f"more than {self._limit} bytes in a message"
             raise ProtocolViolation(Problem("PACKET_TOO_LONG", told))
