@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.control.server import Follow, Verb
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.sdk.errors import ConfigRefused, Problem
 
 if TYPE_CHECKING:  # its import costs ten megabytes, which hosts without peers need not pay

@@ -12,6 +12,7 @@ import asyncio
 import dataclasses
 from collections.abc import Callable, Mapping
 
+from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
 from nondum.transport.fleet.fleet import FleetEvent, Peer
@@ -74,6 +75,12 @@ class ZenohFleet:
     def refusals(self) -> Refusals:
         """Hosts that were turned away, and why."""
         return self._node.refusals
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """ROUTER_UNREACHED while no router is reached."""
+        problem = self._node.problem
+        return (problem,) if problem else ()
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:

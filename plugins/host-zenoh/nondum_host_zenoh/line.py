@@ -120,8 +120,6 @@ class Listeners:
     message: Callable[[Place, int, bytes], None]
     """A message to this host, with its number."""
     to_all: Callable[[Place, bytes], None]
-    trouble: Callable[[Problem], None]
-    """No router is reached."""
 
 
 class _Arrived(NamedTuple):
@@ -148,7 +146,8 @@ class Line:
         self._has_work = threading.Condition()
         self._declared: tuple[object, ...] = ()
         """Kept, since Zenoh undeclares an object without references."""
-        self._is_open = False
+        self._session: zenoh.Session | None = None
+        self._failure = "none has answered yet"
         self._is_closed = False
         self._thread = threading.Thread(target=self._work, name="zenoh", daemon=True)
         self.opened = asyncio.Event()
@@ -157,6 +156,15 @@ class Line:
     def start(self) -> None:
         """Reach a router, and stay with it; returns at once."""
         self._thread.start()
+
+    @property
+    def problem(self) -> Problem | None:
+        """ROUTER_UNREACHED while no router is reached: a session looks for it ever after."""
+        session = self._session
+        if session is not None and (self._is_closed or session.info.routers_zid()):
+            return None
+        told = self._failure if session is None else "its connection has ended"
+        return Problem("ROUTER_UNREACHED", f"no Zenoh router is reached: {told}"[:1000])
 
     def send(self, to: Place, number: int, data: bytes) -> Sent:
         """Send a message to one host, without waiting."""
@@ -176,7 +184,7 @@ class Line:
 
     def _put(self, key: str, data: bytes) -> Sent:
         with self._has_work:
-            if self._is_closed or not self._is_open:
+            if self._is_closed or self._session is None:
                 return Sent.GONE
             if self._waiting_bytes > WAITING_BYTES:
                 return Sent.FULL
@@ -219,12 +227,12 @@ class Line:
             try:
                 session: zenoh.Session = library.open(self._config)
             except library.ZError as error:
-                self._hop(lambda told=str(error): self._listeners.trouble(_unreached(told)))  # type: ignore[misc]  # told is bound
+                self._failure = str(error)
                 with self._has_work:
                     self._has_work.wait(CONNECT_S)
                 continue
             with self._has_work:
-                self._is_open = True  # before another host learns of this one, and wants an answer
+                self._session = session  # before others learn of this one, and greet it
             self._declare(session)
             self._hop(self.opened.set)
             return session
@@ -308,7 +316,3 @@ def _read_place(key: str, epoch: str) -> Place | None:
     except (ValueError, NondumError):
         return None
     return place if 0 < place.epoch <= MAX_ID and str(place) == f"{key}/{epoch}" else None
-
-
-def _unreached(told: str) -> Problem:
-    return Problem("ROUTER_UNREACHED", f"no Zenoh router is reached: {told}"[:1000])

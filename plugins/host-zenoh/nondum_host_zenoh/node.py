@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -32,6 +33,8 @@ from nondum.transport.peers.refusals import Reason, Refusals
 from nondum.transport.peers.suspicion import Terms
 from nondum.transport.peers.trust import Admission, Trust, TrustState
 from nondum_host_zenoh.line import Line, Listeners, Place, RouterAccess
+
+log = logging.getLogger(__name__)
 
 SILENCE_S = 10.0
 """A peer that has told nothing for so long hangs: three of its tellings were missed."""
@@ -119,7 +122,7 @@ class ZenohNode:
             *(self._gate, epoch, handler, self.refusals, on_event, Pulse()), terms=TERMS
         )
         self._loop = asyncio.get_running_loop()
-        listeners = Listeners(self._on_present, self._on_message, self._on_to_all, self._on_trouble)
+        listeners = Listeners(self._on_present, self._on_message, self._on_to_all)
         self._line = Line(access, self._me, listeners)
         self._present: set[Place] = set()
         self._link_states: dict[Place, _LinkState] = {}
@@ -131,6 +134,11 @@ class ZenohNode:
     def peers(self) -> Mapping[PeerKey, Admission]:
         """The peers that can be called now."""
         return {key: session.admission for key, session in self._peer_table.sessions.items()}
+
+    @property
+    def problem(self) -> Problem | None:
+        """Why nobody can be reached now."""
+        return self._line.problem
 
     def round_trip_s(self, peer: PeerKey) -> float | None:
         """Not measured: no peer is pinged."""
@@ -144,7 +152,7 @@ class ZenohNode:
             async with asyncio.timeout(START_S):
                 await self._line.opened.wait()
         except TimeoutError:
-            pass  # told already, by the line
+            log.warning("%s", self.problem)
 
     def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
         """Call a peer. Raises `PeerUnreachable` and more, as `PeerNode.call`."""
@@ -221,9 +229,6 @@ class ZenohNode:
             self._line.send(place, state.number, _OVER)  # it may not know yet
         elif state.link.session is not None:
             self._peer_table.receive(state.link, data)
-
-    def _on_trouble(self, problem: Problem) -> None:
-        self._tell(PeerKey(""), problem)
 
     def _is_greeter(self, place: Place) -> bool:
         """Of two hosts, the one with the smaller key greets."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import zenoh
 from tests.kit.clock import VirtualClock
+from tests.kit.until import until_async
 from tests.transport.fleet.fleets import (
     PATIENCE_S,
     Member,
@@ -111,9 +112,22 @@ def test_host_doubts_when_it_has_told_nothing_and_before_it_is_given_up() -> Non
 async def test_router_that_is_late_is_waited_for(world: ZenohWorld) -> None:
     world.close()
     async with world.member("rover") as rover, world.member("base") as base:
-        assert (await base.told(DialFailed)).problem.code == "ROUTER_UNREACHED"
+        assert [problem.code for problem in base.fleet.problems] == ["ROUTER_UNREACHED"]
         world.router = router(world.port)
         assert (await base.told(PeerUp)).key == rover.key
+        assert not base.fleet.problems
+
+
+async def test_router_that_is_gone_is_missed_until_it_is_back(world: ZenohWorld) -> None:
+    async with world.member("rover") as rover, world.member("base") as base:
+        await base.told(PeerUp)
+        world.close()
+        assert (await base.told(PeerLost)).key == rover.key
+        await until_async("the router is missed", lambda: base.fleet.problems)
+        assert base.fleet.problems[0].code == "ROUTER_UNREACHED"
+        world.router = router(world.port)
+        assert (await base.told(PeerUp)).key == rover.key
+        assert not base.fleet.problems
 
 
 async def test_routers_word_is_told_as_such(world: ZenohWorld) -> None:

@@ -11,7 +11,7 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.control.rows import (
     peers_device_row,
 )
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.sources.devices import view
 from nondum.sdk.errors import Problem
 

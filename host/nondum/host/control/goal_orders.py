@@ -12,8 +12,8 @@ from nondum.host.control.committed import until_committed
 from nondum.host.control.news import News
 from nondum.host.control.rows import own_goal_row
 from nondum.host.core.elsewhere import Elsewhere
-from nondum.host.core.plain import Row
 from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.row import Row
 from nondum.host.core.status import coming_in
 from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition

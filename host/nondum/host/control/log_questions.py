@@ -13,8 +13,8 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.control.rows import (
     journal_row,
 )
-from nondum.host.core.plain import Row
 from nondum.host.core.records.moment import Moment
+from nondum.host.core.row import Row
 from nondum.host.core.unknown import unknown
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import NondumError

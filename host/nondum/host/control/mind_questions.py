@@ -16,8 +16,8 @@ from nondum.host.control.rows import (
 )
 from nondum.host.core.elsewhere import Elsewhere
 from nondum.host.core.names import whole
-from nondum.host.core.plain import Row
 from nondum.host.core.records.step import Step
+from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
 from nondum.host.sources.devices import view
 from nondum.sdk.errors import GoalRefused, Problem

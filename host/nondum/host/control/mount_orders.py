@@ -13,8 +13,8 @@ from nondum.host.control.news import News
 from nondum.host.core.bus import Bus
 from nondum.host.core.events.mounts import MountSet
 from nondum.host.core.names import whole
-from nondum.host.core.plain import Row
 from nondum.host.core.records.mount import MountPose
+from nondum.host.core.row import Row
 from nondum.host.core.unknown import unknown
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.mind import Mind

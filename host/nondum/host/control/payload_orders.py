@@ -17,11 +17,11 @@ from nondum.host.core.bus import Bus
 from nondum.host.core.events.daemon import SafeModeLeft
 from nondum.host.core.events.drives import DriveRetried
 from nondum.host.core.events.payloads import ForgetAsked, RetryAsked
-from nondum.host.core.plain import Row
 from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.safety import Safety
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.records.step import Step
+from nondum.host.core.row import Row
 from nondum.host.core.status import is_at_rest
 from nondum.host.core.unknown import unknown
 from nondum.host.lifecycle.retry_rules import is_quarantined

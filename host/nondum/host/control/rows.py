@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from nondum.host.control.news import Progress
-from nondum.host.core.plain import Row
 from nondum.host.core.records.component import ComponentRecord, ComponentState
 from nondum.host.core.records.drive import DriveRecord
 from nondum.host.core.records.journal import JournalEntry
@@ -14,6 +13,7 @@ from nondum.host.core.records.peer import PeerComponent
 from nondum.host.core.records.safety import Safety
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.records.step import Step
+from nondum.host.core.row import Row
 from nondum.host.core.status import is_at_rest, waits_for_devices
 from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.host.workers.optional_inputs import Choice, Source

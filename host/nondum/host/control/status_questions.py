@@ -20,8 +20,8 @@ from nondum.host.control.rows import (
     offered_row,
     payload_row,
 )
-from nondum.host.core.plain import Row
 from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
 from nondum.host.trust.vouched import Vouched
 from nondum.host.workers.workers import Workers

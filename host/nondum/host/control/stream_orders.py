@@ -14,7 +14,7 @@ from nondum.host.control.server import Handing
 from nondum.host.core.bus import Bus
 from nondum.host.core.events.inputs import InputConnected
 from nondum.host.core.names import whole
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.core.unknown import unknown
 from nondum.host.mind.mind import Mind
 from nondum.host.workers.optional_inputs import Socket

@@ -11,7 +11,7 @@ from nondum.host.control.rows import (
     input_row,
     stream_row,
 )
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.workers.workers import Workers
 
 

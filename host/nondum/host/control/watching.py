@@ -12,7 +12,7 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.control.news import News
 from nondum.host.control.status_questions import StatusQuestions
 from nondum.host.control.stream_questions import StreamQuestions
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
 
 LONGEST_EVERY_S = 3600

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Protocol
 
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 
 
 class Elsewhere(Protocol):

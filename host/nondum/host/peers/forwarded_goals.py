@@ -9,8 +9,8 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping
 from typing import Any
 
-from nondum.host.core.plain import Row
 from nondum.host.core.printable import printable
+from nondum.host.core.row import Row
 from nondum.sdk.errors import GoalRefused, Problem
 
 MOST_KEPT = 50

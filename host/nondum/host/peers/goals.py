@@ -14,8 +14,8 @@ from typing import Any
 from nondum.host.core.events.event import Event
 from nondum.host.core.events.goals import GoalEnded, GoalReached, PlanMissing
 from nondum.host.core.events.peers import PeerJoined, PeerLeft
-from nondum.host.core.plain import Row
 from nondum.host.core.printable import printable
+from nondum.host.core.row import Row
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect

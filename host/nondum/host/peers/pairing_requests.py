@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator, Callable, Iterable, Mapping, Sequenc
 from dataclasses import dataclass
 from typing import Protocol
 
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import Problem
 from nondum.transport.peers.failures import PeerRefused

@@ -13,7 +13,7 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.events.facts import UnitsTaken
 from nondum.host.core.events.peers import CertificatesBrought
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.extension.hookspecs import FleetMember, MakeFleet
 from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
@@ -155,6 +155,7 @@ class PeerServices:
             hints=self._hints,
             network=lambda: self.finder.status if self.finder else None,
             refusals=self.fleet.refusals,
+            problems=lambda: self.fleet.problems,
             links_pid=lambda: self.fleet.links_pid if isinstance(self.fleet, Mesh) else None,
         )
 
@@ -228,6 +229,7 @@ class PeerServices:
         unsafe = ("peers need no keys: every host on this machine is one",) if is_open else ()
         own = self.finder.identity_problem if self.finder else None
         problems = (
+            *self.fleet.problems,
             *self.trust_store.warnings,
             *self._name_conflicts.problems,
             *((own,) if own else ()),

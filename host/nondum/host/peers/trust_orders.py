@@ -12,7 +12,7 @@ from datetime import datetime
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
-from nondum.host.core.plain import Row
+from nondum.host.core.row import Row
 from nondum.host.peers.pairing_requests import PairingRequests
 from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import NondumError, Problem

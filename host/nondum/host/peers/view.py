@@ -9,10 +9,11 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
-from nondum.host.core.plain import Row
 from nondum.host.core.printable import printable
 from nondum.host.core.records.peer import PeerRecord
 from nondum.host.core.records.snapshot import Snapshot
+from nondum.host.core.row import Row
+from nondum.sdk.errors import Problem
 from nondum.transport.discovery import DiscoveryStatus, Hint
 from nondum.transport.fleet import FleetEvent, Peer
 from nondum.transport.peers import (
@@ -56,11 +57,12 @@ class PeersView:
         hints: Callable[[], Iterable[Hint]],
         network: Callable[[], DiscoveryStatus | None],
         refusals: Refusals,
+        problems: Callable[[], Iterable[Problem]],
         links_pid: Callable[[], int | None],
     ) -> None:
         self._security, self._snapshot, self._peers, self._trust = security, snapshot, peers, trust
         self._hints, self._network, self._refusals = hints, network, refusals
-        self._links_pid = links_pid
+        self._problems, self._links_pid = problems, links_pid
         self._past: dict[PeerKey, _Past] = {}
         self._loop = asyncio.get_running_loop()
 
@@ -108,7 +110,10 @@ class PeersView:
             if network
             else [],
             "static": [_aged(asdict(row), now_s) for row in network.static] if network else [],
-            "problems": [str(problem) for problem in network.problems] if network else [],
+            "problems": [
+                *map(str, self._problems()),
+                *map(str, network.problems if network else ()),
+            ],
             "hints_of_no_use": dict(network.refused) if network else {},
             "refused": {reason.value: n for reason, n in self._refusals.counts.items()},
             "latest": [

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
+from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import PeerEvent
@@ -73,6 +74,10 @@ class Fleet(Protocol):
     @property
     def refusals(self) -> Refusals:
         """Hosts that were turned away, and why."""
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """What keeps this host from all others now; to be shown with every status."""
 
     async def start(self) -> None:
         """Be there for peers. Raises `PeerRefused` for what cannot be listened at."""

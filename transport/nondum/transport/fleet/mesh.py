@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Protocol, TypeAlias
 
+from nondum.sdk.errors import Problem
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.catalogues import Catalogues
 from nondum.transport.fleet.dialling import DialPolicy
@@ -102,6 +103,11 @@ class Mesh:
     def refusals(self) -> Refusals:
         """Hosts that were turned away, and why."""
         return self._node.refusals
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """None: whoever is in reach is found sooner or later."""
+        return ()
 
     @property
     def peers(self) -> Mapping[PeerKey, Peer]:

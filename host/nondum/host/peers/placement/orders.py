@@ -10,9 +10,9 @@ from nondum.host.control.arguments import Arguments
 from nondum.host.control.news import Progress
 from nondum.host.core.events.event import Emit
 from nondum.host.core.events.payloads import RetryAsked
-from nondum.host.core.plain import Row
 from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
+from nondum.host.core.row import Row
 from nondum.host.core.unknown import unknown
 from nondum.host.peers.placement.case import Case
 from nondum.host.peers.placement.decide import ELSEWHERE, movable_source

@@ -1,4 +1,4 @@
-"""Rows of tables that people's tools are shown."""
+"""A row of a table that people's tools are shown."""
 
 from __future__ import annotations
 
