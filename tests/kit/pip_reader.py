@@ -14,14 +14,14 @@ from packaging.utils import canonicalize_name
 from nondum.wheelhouse.format import lock
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.lock import LockedWheel
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import host_facts
 from nondum.wheelhouse.store import venvs
 
 
 def locked(folder: Path, component: str) -> tuple[LockedWheel, ...]:
     """What the lock of a component in a payload folder selects for this host."""
     name = lock.file_name(component)
-    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(folder, reserve_mb=0, confinement=Level.NONE)
     parsed = lock.parse((folder / name).read_text(encoding="utf-8"), name)
     return lock.select(parsed, facts.environment, facts.tags)
 

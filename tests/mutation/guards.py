@@ -76,6 +76,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     ),
     f"{_H}/jobs/loose_goals.py": (f"{_TH}/jobs/test_loose_goals.py",),
     f"{_H}/jobs/look.py": (f"{_TH}/jobs/test_look.py",),
+    f"{_H}/jobs/noted.py": (f"{_TH}/jobs/test_noted.py",),
     f"{_H}/jobs/read_pace.py": (f"{_TH}/jobs/test_read_pace.py",),
     f"{_H}/jobs/forked_trial.py": (f"{_TH}/jobs/test_forked_trial.py",),
     f"{_H}/jobs/parcel.py": (f"{_TH}/jobs/test_parcel.py",),
@@ -128,7 +129,6 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         f"{_TH}/manager/test_memory_reservations.py::test_what_was_promised_while_it_was_copied_counts",
         f"{_TH}/jobs/test_install.py",
     ),
-    f"{_H}/lifecycle/rebuilding.py": (f"{_TH}/lifecycle/test_rebuilding.py",),
     # What processes of this host say that read what strangers wrote.
     f"{_H}/rpc/channel.py": (
         f"{_TH}/rpc/test_child_link.py",

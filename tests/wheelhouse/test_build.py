@@ -29,7 +29,7 @@ from nondum.wheelhouse.format import contents, index, lock
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.format.target import Target, targets
-from nondum.wheelhouse.payload import drive, payload, preflight
+from nondum.wheelhouse.payload import drive, host_facts, payload
 
 HERE = Target.here()
 OTHER = Target("aarch64" if HERE.architecture != "aarch64" else "x86_64", HERE.python)
@@ -74,7 +74,7 @@ def refused(act: Callable[[], object], kind: type[NondumError]) -> list[str]:
 
 def test_a_source_becomes_a_payload_that_hosts_take(built: Build, tmp_path: Path) -> None:
     folder = built(make_source(tmp_path / "src"))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert drive.find_payloads(tmp_path / "drive") == (folder,)
     listed = contents.parse(drive.read_contents(folder), "CONTENTS")

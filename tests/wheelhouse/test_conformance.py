@@ -22,7 +22,7 @@ from nondum.wheelhouse.build import locking
 from nondum.wheelhouse.format import lock
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.target import Target
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import host_facts
 from nondum.wheelhouse.store import bytecode, venvs
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
@@ -63,7 +63,7 @@ def stored(folder: Path) -> list[StoredWheel]:
     """The wheels as chosen from the lock, in the store."""
     store = Store(folder / "store")
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
-    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(folder, reserve_mb=0, confinement=Level.NONE)
     chosen = lock.select(parsed, facts.environment, facts.tags)
     for one in chosen:
         store.add(folder / one.path, one.sha256)
@@ -185,7 +185,7 @@ def test_the_distributions_work_together(ours: Path) -> None:
 @long
 def test_the_other_method_gives_the_same_tree(folder: Path, pips: Path) -> None:
     parsed = lock.parse((folder / "pylock.popular.toml").read_text(), "lock")
-    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(folder, reserve_mb=0, confinement=Level.NONE)
     venvs.make_with_pip(
         folder / "by-pip", PYTHON, folder, lock.select(parsed, facts.environment, facts.tags)
     )

@@ -14,7 +14,7 @@ from nondum.wheelhouse.build.verification import Verified, verify
 from nondum.wheelhouse.format import goals
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
-from nondum.wheelhouse.payload import drive, preflight
+from nondum.wheelhouse.payload import drive, host_facts
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
 
 ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.delivery"
@@ -23,7 +23,7 @@ ALICE, ROOT, ID = Key("alice"), Key("root"), "org.example.delivery"
 def judged(folder: Path, *permissions: str) -> Verified:
     roles = {"maker": (["org.example"], [ALICE])}
     trust = trust_of(roots=[ROOT], roles=roles, permissions=permissions)
-    facts = preflight.probe(folder, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(folder, reserve_mb=0, confinement=Level.NONE)
     return verify(folder, Judging(trust, Circumstances()), facts)
 
 

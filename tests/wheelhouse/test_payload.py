@@ -20,9 +20,9 @@ from nondum.wheelhouse.build.verification import verify
 from nondum.wheelhouse.format import contents
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
-from nondum.wheelhouse.payload import drive, payload, preflight
+from nondum.wheelhouse.payload import drive, host_facts, payload
+from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload, check_wheels, is_metadata, load
-from nondum.wheelhouse.payload.preflight import HostFacts
 
 PLAIN = Part("blinker", "X = 1\n", with_sdk=False)
 ID = "org.example.test"
@@ -35,7 +35,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def facts(tmp_path: Path) -> HostFacts:
-    return preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
+    return host_facts.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
 
 
 def check(folder: Path, facts: HostFacts | None = None) -> tuple[Problem, ...]:

@@ -15,8 +15,9 @@ from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse.format import lock, manifest
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.lock import Lock
+from nondum.wheelhouse.payload.host_facts import HostFacts, probe
 from nondum.wheelhouse.payload.memory import Memory
-from nondum.wheelhouse.payload.preflight import HostFacts, preflight, probe, select, unmet
+from nondum.wheelhouse.payload.preflight import preflight, select, unmet
 
 ENVIRONMENT, TAGS = host((3, 11), "x86_64")
 FACTS = HostFacts(

@@ -20,7 +20,7 @@ from nondum.wheelhouse.format import manifest
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.format.target import Target
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import host_facts
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_it_becomes_a_payload_that_hosts_take(made: NewPackage, tmp_path: Path) 
     options = build.Options(targets=(Target.here(),), libraries=(SDK,))
     told: list[tuple[str, int, int]] = []
     folder = build.build(made.folder, tmp_path / "drive", options, lambda *s: told.append(s))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     assert folder == tmp_path / "drive/nondum/org.example.window-opener"
     assert verify(folder, UnsignedAllowed(), facts).problems == ()
     assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)

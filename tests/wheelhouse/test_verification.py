@@ -14,7 +14,7 @@ from nondum.wheelhouse.build.verification import Verified, verify
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed, Verdict
 from nondum.wheelhouse.format.target import Target, targets
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import host_facts
 from nondum.wheelhouse.trust.judging import Circumstances, Judging
 
 ID = "org.example.test"
@@ -33,7 +33,7 @@ def codes(found: Verified) -> list[str]:
 
 
 def test_a_whole_payload_passes(folder: Path) -> None:
-    found = verify(folder, UnsignedAllowed(), preflight.of_target(Target("aarch64", "3.12")))
+    found = verify(folder, UnsignedAllowed(), host_facts.of_target(Target("aarch64", "3.12")))
     assert (found.problems, found.signers) == ((), ())
     assert found.payload is not None and set(found.payload.index) == {"blinker"}
 
@@ -95,7 +95,7 @@ def test_every_changed_file_is_told(folder: Path) -> None:
 def test_everything_is_told_once_and_with_what_to_do(tmp_path: Path) -> None:
     bad = WheelBuilder(files={"evil/__init__.py": b"", "json.py": b""}).write(tmp_path)
     folder = make_payload(tmp_path / "drive", Part("blinker", "X = 1\n", wheels=(bad,)))
-    facts = preflight.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
+    facts = host_facts.probe(tmp_path, reserve_mb=0, confinement=Level.NONE)
     found = verify(folder, UnsignedAllowed(), facts)
     assert codes(found) == ["WHEEL_SHADOWS"]
     assert all(problem.fix and problem.where for problem in found.problems)
@@ -109,7 +109,7 @@ def test_named_hosts_are_judged_by_their_own_tags(tmp_path: Path) -> None:
     )
     for target in targets(("aarch64", "x86_64"), ("3.11", "3.12")):
         fits = target == Target("aarch64", "3.12")
-        found = verify(folder, UnsignedAllowed(), preflight.of_target(target))
+        found = verify(folder, UnsignedAllowed(), host_facts.of_target(target))
         assert codes(found) == ([] if fits else ["WHEEL_INCOMPATIBLE"])
 
 
@@ -117,7 +117,7 @@ def test_wheels_that_exclude_the_python_are_told(tmp_path: Path) -> None:
     metadata = b"Metadata-Version: 2.1\nName: evil\nVersion: 1.0\nRequires-Python: <3.0\n"
     old = WheelBuilder(metadata=metadata).write(tmp_path)
     folder = make_payload(tmp_path / "drive", Part("blinker", "X = 1\n", wheels=(old,)))
-    found = verify(folder, UnsignedAllowed(), preflight.of_target(Target("x86_64", "3.11")))
+    found = verify(folder, UnsignedAllowed(), host_facts.of_target(Target("x86_64", "3.11")))
     (problem,) = found.problems
     assert (problem.code, problem.need) == ("WHEEL_INCOMPATIBLE", "Python <3.0")
 

@@ -24,7 +24,7 @@ from nondum.planning.search import solve
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.planner import Answer, GroundTask
-from nondum.wheelhouse.payload.preflight import HostFacts
+from nondum.wheelhouse.payload.host_facts import HostFacts
 
 WAYS_LIMIT = 10
 """The largest number of alternatives that are shown."""

@@ -10,7 +10,7 @@ from nondum.sdk.errors import HostUnreachable
 
 if TYPE_CHECKING:
     from nondum.wheelhouse.format.confinement import Level
-    from nondum.wheelhouse.payload.preflight import HostFacts
+    from nondum.wheelhouse.payload.host_facts import HostFacts
 
 
 def this_machine(session: Session) -> HostFacts:
@@ -18,9 +18,9 @@ def this_machine(session: Session) -> HostFacts:
 
     Where none runs, the best level that the one who asks could have. Blocks, to find that out.
     """
-    from nondum.wheelhouse.payload import preflight
+    from nondum.wheelhouse.payload import host_facts
 
-    return preflight.probe(Path.cwd(), reserve_mb=0, confinement=_level(session))
+    return host_facts.probe(Path.cwd(), reserve_mb=0, confinement=_level(session))
 
 
 def _level(session: Session) -> Level:

@@ -17,8 +17,9 @@ from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
 from nondum.wheelhouse.format import contents
 from nondum.wheelhouse.payload import drive
+from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload, load
-from nondum.wheelhouse.payload.preflight import HostFacts, preflight
+from nondum.wheelhouse.payload.preflight import preflight
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from nondum.sdk.errors import HostUnreachable, NondumError, PayloadRefused, Prob
 if TYPE_CHECKING:
     from nondum.wheelhouse.build.verification import Verified
     from nondum.wheelhouse.format.signatures import Verifier
-    from nondum.wheelhouse.payload.preflight import HostFacts
+    from nondum.wheelhouse.payload.host_facts import HostFacts
     from nondum.wheelhouse.trust.trust import Trust
 
 FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
@@ -164,13 +164,13 @@ def _verified(
 def _facts(session: Session, arch: str | None, python: str | None) -> HostFacts:
     """The host that is asked about: this machine, or any of the kind that is named."""
     from nondum.wheelhouse.format.target import Target, targets
-    from nondum.wheelhouse.payload import preflight
+    from nondum.wheelhouse.payload import host_facts
 
     if arch is None and python is None:
         return this_machine(session)
     here = Target.here()
     (target,) = targets((arch or here.architecture,), (python or here.python,))
-    return preflight.of_target(target)
+    return host_facts.of_target(target)
 
 
 def _trusted(session: Session, file: Path | None) -> Trust | None:

@@ -160,10 +160,12 @@ class Line:
     @property
     def problem(self) -> Problem | None:
         """ROUTER_UNREACHED while no router is reached: a session looks for it ever after."""
-        session = self._session
-        if session is not None and (self._is_closed or session.info.routers_zid()):
+        if self._session is None:
+            told = self._failure
+        elif self._session.info.routers_zid():
             return None
-        told = self._failure if session is None else "its connection has ended"
+        else:
+            told = "its connection has ended"
         return Problem("ROUTER_UNREACHED", f"no Zenoh router is reached: {told}"[:1000])
 
     def send(self, to: Place, number: int, data: bytes) -> Sent:

@@ -137,7 +137,7 @@ class ZenohNode:
 
     @property
     def problem(self) -> Problem | None:
-        """Why nobody can be reached now."""
+        """Why no host can be reached now."""
         return self._line.problem
 
     def round_trip_s(self, peer: PeerKey) -> float | None:

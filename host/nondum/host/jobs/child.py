@@ -71,8 +71,8 @@ def _ahead() -> Iterator[None]:
     for job in table.AT_ONCE:
         _import(job)
         yield
-    preflight = import_module("nondum.wheelhouse.payload.preflight")
-    preflight.probe(Path.cwd(), reserve_mb=0, confinement=Level.NONE)
+    host_facts = import_module("nondum.wheelhouse.payload.host_facts")
+    host_facts.probe(Path.cwd(), reserve_mb=0, confinement=Level.NONE)
 
 
 def _import(name: str) -> None:

@@ -20,8 +20,8 @@ from nondum.wheelhouse.build import source
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.manifest import ComponentManifest
 from nondum.wheelhouse.payload import memory
+from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload
-from nondum.wheelhouse.payload.preflight import HostFacts
 from nondum.wheelhouse.store import venvs
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel

@@ -32,10 +32,10 @@ from nondum.wheelhouse.format import confinement, contents
 from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.signatures import Verdict, Verifier
-from nondum.wheelhouse.payload import drive, payload, preflight
+from nondum.wheelhouse.payload import drive, host_facts, payload, preflight
+from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.memory import Memory, Promised
 from nondum.wheelhouse.payload.payload import StagedPayload
-from nondum.wheelhouse.payload.preflight import HostFacts
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 from nondum.wheelhouse.wheels.dist_info import Needs
@@ -158,7 +158,7 @@ def load_staged(folder: Path) -> StagedPayload:
 
 def facts_of(arguments: Arguments) -> HostFacts:
     """This host, as preflight looks at it."""
-    return preflight.probe(
+    return host_facts.probe(
         Path(arguments["store"]),
         reserve_mb=arguments["reserve_mb"],
         confinement=confinement.parse(arguments["confinement"]),
@@ -232,7 +232,7 @@ def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:
 
 
 def _version_problems(listed: Contents) -> Iterator[Problem]:
-    have = preflight.nondum_version()
+    have = host_facts.nondum_version()
     if Version(listed.minimum_nondum) > Version(have):
         yield Problem(
             "NONDUM_VERSION",

@@ -43,7 +43,7 @@ JOBS: Mapping[str, str] = {
     "prune": "nondum.host.jobs.install:prune",
     "listing": "nondum.host.jobs.install:listing",
     "sweep": "nondum.host.jobs.install:sweep",
-    "found": "nondum.host.lifecycle.rebuilding:found",
+    "found": "nondum.host.jobs.noted:found",
     "trust_load": "nondum.host.trust.chain:load",
     "trust_extend": "nondum.host.trust.chain:extend",
     "trust_judge_kept": "nondum.host.trust.chain:judge_kept",

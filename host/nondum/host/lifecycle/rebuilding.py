@@ -1,19 +1,16 @@
 """What is installed for good is told beside its files, so that it outlives the catalogue.
 
-The note names the drive that stands for it; release, version and components are in its own files,
-which are hashed again before they are believed.
+The note names the drive that stands for it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from nondum.host.core import payload_key
 from nondum.host.core.effects import NoteInstalled
 from nondum.host.core.records.drive import INSTALLED, DriveRecord, DriveState
 from nondum.host.core.records.moment import Moment
@@ -21,12 +18,8 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
 from nondum.host.core.state import Highwater, HostState
 from nondum.host.core.transitions import KEEPS_FOLDER
-from nondum.host.jobs.table import Arguments, Report
 from nondum.host.lifecycle import component_names, crash_attribution
 from nondum.host.lifecycle.turn import Turn
-from nondum.sdk.errors import NondumError
-from nondum.wheelhouse.format import contents
-from nondum.wheelhouse.payload import payload
 from nondum.wheelhouse.store import disk
 
 
@@ -66,41 +59,6 @@ def write_note(note: Path, drive: str, folder: Path | None) -> None:
     if not note.exists() or note.read_bytes() != data:
         disk.make_folder(note.parent)
         disk.write(note, data)
-
-
-def found(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
-    """In a child: each payload that a note tells of, if its files are whole."""
-    notes, payloads = Path(arguments["notes"]), Path(arguments["payloads"])
-    said = []
-    for note in sorted(notes.glob("*.json")):
-        try:
-            said.append(_told(json.loads(note.read_bytes()), payloads / note.stem))
-        except (NondumError, OSError, ValueError, LookupError):
-            continue  # it is not brought back: the sweep takes its files away
-    return said
-
-
-def _told(note: Mapping[str, str], folder: Path) -> dict[str, Any]:
-    data = (folder / contents.NAME).read_bytes()
-    digest = hashlib.sha256(data).hexdigest()
-    if not payload_key.is_key_of(folder.name, digest):
-        raise ValueError("it is not the payload that it was")
-    listed = contents.parse(data, contents.NAME)
-    for entry in (entry for entry in listed.entries if payload.is_metadata(entry.path)):
-        if hashlib.sha256((folder / entry.path).read_bytes()).hexdigest() != entry.sha256:
-            raise ValueError(f"{entry.path} is not what it was")
-    staged = payload.load(folder, listed)
-    return {
-        "key": folder.name,
-        "digest": digest,
-        "payload_id": listed.payload_id,
-        "version": listed.version,
-        "release": listed.release,
-        "fleet": listed.fleet,
-        "components": [component.id for component in staged.manifest.components],
-        "drive": note["drive"],
-        "folder": note["folder"],
-    }
 
 
 def with_found(state: HostState, said: list[dict[str, Any]], at: Moment) -> HostState:

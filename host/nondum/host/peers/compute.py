@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import platform
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from nondum.wheelhouse.format.confinement import Level
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import memory
+from nondum.wheelhouse.store import disk
 
 Compute = dict[str, Any]
 
@@ -17,14 +19,13 @@ def probed(state: Path, *, reserve_mb: int) -> Compute:
 
     `machine`, `python`, `processors`, `memory_mb` and `disk_mb` that are free, `nondum`.
     """
-    facts = preflight.probe(state, reserve_mb=reserve_mb, confinement=Level.NONE)
-    gpu = facts.memory.gpu
+    free = memory.look()
     return {
-        "machine": facts.architecture,
-        "python": facts.python,
+        "machine": platform.machine(),
+        "python": platform.python_version(),
         "processors": len(os.sched_getaffinity(0)),
-        "memory_mb": facts.memory.free_mb,
-        "gpu_memory_mb": gpu.free_mb if gpu is not None else None,
-        "disk_mb": facts.free_disk_mb,
-        "nondum": facts.nondum,
+        "memory_mb": free.free_mb,
+        "gpu_memory_mb": free.gpu.free_mb if free.gpu is not None else None,
+        "disk_mb": disk.free_mb(state, reserve_mb),
+        "nondum": metadata.version("nondum"),
     }

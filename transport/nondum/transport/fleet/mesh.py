@@ -106,7 +106,7 @@ class Mesh:
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """None: whoever is in reach is found sooner or later."""
+        """None: hosts are looked for one by one."""
         return ()
 
     @property

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from nondum.wheelhouse.format.target import Target
-from nondum.wheelhouse.payload import preflight
+from nondum.wheelhouse.payload import host_facts
 from nondum.wheelhouse.payload.payload import StagedPayload
 
 LARGE_BYTES = 100_000_000
@@ -45,5 +45,5 @@ def costs(payload: StagedPayload, targets: Sequence[Target]) -> tuple[Cost, ...]
 
 def _taken(payload: StagedPayload, target: Target) -> dict[str, int]:
     """Path → size of the wheels that such a host takes, each once."""
-    chosen = payload.wheels(preflight.of_target(target)).values()
+    chosen = payload.wheels(host_facts.of_target(target)).values()
     return {wheel.path: wheel.size for wheels in chosen for wheel in wheels}

@@ -18,8 +18,9 @@ from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.signatures import Verdict, Verifier
 from nondum.wheelhouse.payload import drive, payload
 from nondum.wheelhouse.payload.drive import Progress
+from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload
-from nondum.wheelhouse.payload.preflight import HostFacts, preflight
+from nondum.wheelhouse.payload.preflight import preflight
 from nondum.wheelhouse.wheels import wheel
 
 

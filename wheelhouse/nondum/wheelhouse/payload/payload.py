@@ -19,7 +19,8 @@ from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.index import Index
 from nondum.wheelhouse.format.lock import Lock, LockedWheel
 from nondum.wheelhouse.format.manifest import ComponentManifest, Manifest
-from nondum.wheelhouse.payload.preflight import HostFacts, misfits, select, unmet, unpacked_problems
+from nondum.wheelhouse.payload.host_facts import HostFacts
+from nondum.wheelhouse.payload.preflight import misfits, select, unmet, unpacked_problems
 from nondum.wheelhouse.wheels import wheel
 from nondum.wheelhouse.wheels.wheel import Layout
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import shutil
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, Problem
 
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FAILING = frozenset({errno.EIO, errno.EROFS, errno.EUCLEAN})
+_MB = 1024 * 1024
 _SHORT = {errno.EMFILE: "descriptors", errno.ENFILE: "descriptors", errno.ENOMEM: "memory"}
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
@@ -69,6 +71,12 @@ def sync_file_system(folder: Path) -> None:
             raise OSError(code, os.strerror(code))
     finally:
         os.close(descriptor)
+
+
+def free_mb(folder: Path, reserve_mb: int) -> int:
+    """What is free on the file system that a folder is on, or will be, less a reserve."""
+    there = next(found for found in (folder, *folder.parents) if found.exists())
+    return max(0, shutil.disk_usage(there).free // _MB - reserve_mb)
 
 
 def failed(error: OSError, what: str, where: Path) -> InstallFailed:

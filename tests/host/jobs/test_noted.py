@@ -12,7 +12,7 @@ import pytest
 from tests.kit.lamp_drive import PAYLOAD, lamp, told
 
 from nondum.host.core import payload_key
-from nondum.host.lifecycle import rebuilding
+from nondum.host.jobs import noted
 
 
 @pytest.fixture(params=[payload_key.DIGITS, payload_key.FORMER_DIGITS])
@@ -29,7 +29,7 @@ def kept(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
 
 def found(tmp_path: Path) -> list[dict[str, Any]]:
     places = {"notes": str(tmp_path / "notes"), "payloads": str(tmp_path / "payloads")}
-    return rebuilding.found(places, told)
+    return noted.found(places, told)
 
 
 def test_payload_that_is_whole_is_found(kept: Path, tmp_path: Path) -> None:
