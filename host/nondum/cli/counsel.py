@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from nondum.planning.merge.merge import merge
 from nondum.planning.search import solve
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import Answer, GroundTask
 from nondum.wheelhouse.payload.host_facts import HostFacts
 
@@ -35,7 +35,7 @@ _GLANCE_S = 1.0
 """How many sets of payloads are planned with for the sake of a sentence, and how long in all."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Counsel:
     """All that is told of one goal."""
 
@@ -52,7 +52,7 @@ class Counsel:
     in none of the ways; their caveats say why."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Surroundings:
     """A host, what it remembers, and the payloads around it."""
 

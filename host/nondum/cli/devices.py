@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,7 +109,7 @@ def _drivers(
 
 def _driver_row(driver: Driver) -> Row:
     """A payload that would use a device, as data."""
-    return {name: getattr(driver, name) for name in driver.__slots__}
+    return {field.name: getattr(driver, field.name) for field in fields(driver)}
 
 
 def _show(rows: list[Row], drivers: dict[str, tuple[Driver, ...]]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from nondum.host.core.records.device import DeviceRecord
@@ -15,6 +15,7 @@ from nondum.planning.merge.contribution import Contribution, object_name
 from nondum.planning.pddl.facts import fact
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import contents
 from nondum.wheelhouse.payload import drive
 from nondum.wheelhouse.payload.host_facts import HostFacts
@@ -22,7 +23,7 @@ from nondum.wheelhouse.payload.payload import StagedPayload, load
 from nondum.wheelhouse.payload.preflight import preflight
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Shelved:
     """A payload that is known of."""
 

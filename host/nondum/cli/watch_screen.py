@@ -5,7 +5,6 @@ from __future__ import annotations
 import textwrap
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -13,6 +12,7 @@ import click
 from nondum.cli import render
 from nondum.cli.outline import STEP_COLOUR, STEP_MARK
 from nondum.host.core.printable import printable
+from nondum.sdk.frozen import frozen
 
 View = Mapping[str, Any]
 
@@ -30,7 +30,7 @@ _GOALS = {
 _OPEN = ("active", "queued", "suspended")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Line:
     """One line: a mark, and words of which what does not fit is cut."""
 
@@ -43,7 +43,7 @@ class Line:
         return f" {click.style(self.mark, fg=self.colour)} {cut(self.text, width and width - 3)}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Section:
     """Lines under a title."""
 

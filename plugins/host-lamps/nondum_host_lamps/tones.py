@@ -8,9 +8,9 @@ import math
 import sys
 import wave
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from nondum.host.core.feedback_state import State
+from nondum.sdk.frozen import frozen
 
 RATE_HZ = 16_000
 LOUDNESS = 0.4
@@ -19,7 +19,7 @@ _EDGE_S = 0.005
 """In which a tone swells and fades: without, it clicks."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Tone:
     """A tone, or silence where its pitch is 0."""
 

@@ -19,11 +19,11 @@ import re
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.peers.drained import AT_ONCE, Sent
 from nondum.transport.peers.failures import PeerRefused
@@ -53,7 +53,7 @@ class Place(NamedTuple):
         return f"{self.key.encode().hex()}/{self.epoch}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RouterAccess:
     """How to reach the routers of a fleet."""
 
@@ -111,7 +111,7 @@ class RouterAccess:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Listeners:
     """Callbacks for what arrives; called on the loop."""
 

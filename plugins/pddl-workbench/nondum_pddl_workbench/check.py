@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from nondum.cli.failure import EXIT_BAD_INPUT, tell_problem
 from nondum.cli.progress import ProgressLine
 from nondum.cli.session import Session
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum_pddl_workbench.files import FILE, loaded, parsed, text_of
 from nondum_pddl_workbench.fragments import Owned, contribution_of, unit_option
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nondum.planning.pddl.syntax import DomainFragment, FragmentSyntax
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Judged:
     """What was found in one file."""
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum_pddl_workbench.files import text_of
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _OWNED = re.compile(r"(?:([a-z0-9_-]+):)?([a-z0-9_-]+)(?:/([a-z0-9_-]+))?=([a-z0
 _NO_NAME = re.compile(r"[^a-z0-9]+")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Owned:
     """A unit, or an output slot of one."""
 

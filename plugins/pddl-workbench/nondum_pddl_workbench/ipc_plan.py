@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nondum.planning.merge.scope import PROBLEMS_LIMIT
 from nondum.planning.pddl.caret import refusal
 from nondum.planning.pddl.syntax import Place
 from nondum.sdk.errors import FragmentRefused
+from nondum.sdk.frozen import frozen
 
 _BESIDE = re.compile(r"^(\s*[0-9.]+(?:e[+-]?[0-9]+)?\s*:)|\[[^\][()]*\]", re.IGNORECASE)
 """The time before a step, and its duration and cost behind it: `[1.0]`, `[D:1.0; C:2.0]`."""
@@ -20,7 +20,7 @@ PSEUDO_STEPS = frozenset({"reach-goal", "__extra_goal_operator"})
 """What some planners write after the last action, and no domain knows."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Step:
     """One line of a plan."""
 

@@ -7,7 +7,6 @@ made in grounding would not be seen there.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nondum.planning.ground.lifted import Meaning, Situation
 from nondum.planning.ground.static import Names
@@ -17,12 +16,13 @@ from nondum.planning.pddl.caret import nearest
 from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import renamed, type_text
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 LISTED = 8
 """Missing conditions that are named, at most."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rehearsed:
     """What came of trying out a plan."""
 

@@ -14,6 +14,7 @@ import click
 from nondum.cli.failure import tell_problem
 from nondum.cli.progress import ProgressLine
 from nondum.sdk.errors import FragmentRefused
+from nondum.sdk.frozen import frozen
 from nondum_pddl_workbench.files import loaded
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ INSTANCES_LIMIT = 1_000_000
 _TICK_S = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Limits:
     """The planner to ask (None: all), and the limits of the search."""
 
@@ -68,7 +69,7 @@ def search_options(command: _F) -> _F:
     return command
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Outcome:
     """What is known in the end."""
 

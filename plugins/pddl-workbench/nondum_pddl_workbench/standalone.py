@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.planning.merge.derivation import derived_of, strata_of
 from nondum.planning.merge.domain import Action, Domain, Merged, Object, Origin, Predicate
@@ -22,11 +22,12 @@ from nondum.planning.pddl.parse import parse_fragment
 from nondum.planning.pddl.syntax import Atom, DomainFragment, Numeric, ProblemFragment, TypedName
 from nondum.planning.pddl.typegraph import ROOT, TypeGraph, types_or_root
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.frozen import frozen
 
 SIZE_LIMIT_BYTES = 64 * 1024 * 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Standalone:
     """A planning problem: what `ground` needs."""
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.discovery.doctor import Result
 
 __all__ = ["Finding", "Result", "bad", "is_well", "ok", "row", "warn"]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Finding:
     """What was seen of one thing, and what to do about it."""
 

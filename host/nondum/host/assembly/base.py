@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.host_config import HostConfig
 from nondum.host.core.bus import Bus
@@ -11,9 +9,10 @@ from nondum.host.extension.loading import Extensions
 from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.state_folders import Folders
 from nondum.host.service.service import Service
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Base:
     """What is there before any part: configuration, state, bus, extensions, service manager."""
 

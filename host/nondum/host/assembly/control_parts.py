@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nondum.host import verbs
@@ -28,12 +27,13 @@ from nondum.host.control.watching import Watching
 from nondum.host.mind.mind import Mind
 from nondum.host.people.feedback.feedback import Feedback
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 if TYPE_CHECKING:
     from nondum.host.peers.peer_services import PeerServices
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ControlParts:
     """What people's tools talk to."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nondum.host.assembly.base import Base
@@ -10,12 +9,13 @@ from nondum.host.mind.mind import Mind
 from nondum.host.people.answering import Answering
 from nondum.host.people.conversation import Conversation, Take
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 if TYPE_CHECKING:
     from nondum.host.peers.peer_services import PeerServices
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConversationParts:
     """What talks with people."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nondum.host.assembly.base import Base
@@ -15,12 +14,13 @@ from nondum.host.mind.mind import Mind
 from nondum.host.sources.devices.software import Software
 from nondum.host.trust.clock import ClockWatch
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 if TYPE_CHECKING:
     from nondum.host.peers.peer_services import PeerServices
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FollowerParts:
     """What follows events, or looks for something to tell as one."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from nondum.host.assembly.base import Base
 from nondum.host.assembly.stop_parts import StopAll
@@ -15,9 +14,10 @@ from nondum.host.people.conversation import Reply, Take
 from nondum.host.people.goal_files import GoalFiles
 from nondum.host.people.stopping import Stopping
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalParts:
     """What takes goals."""
 

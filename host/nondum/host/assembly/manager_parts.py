@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nondum.host.assembly.base import Base
 from nondum.host.config.host_config import HostConfig
@@ -15,9 +14,10 @@ from nondum.host.manager.payload_trust import TrustOptions
 from nondum.host.sources.drives.source import DriveSource
 from nondum.host.workers.spec import Limits
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ManagerParts:
     """The component manager and what carries out its effects."""
 

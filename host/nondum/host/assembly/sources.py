@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nondum.host.config.host_config import HostConfig
 from nondum.host.manager.state_folders import Folders
@@ -16,9 +15,10 @@ from nondum.host.sources.drives.debounce import Debounced
 from nondum.host.sources.drives.slots import SlotSource
 from nondum.host.sources.drives.source import DriveSource
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sources:
     """Where this host's drives and devices come from."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from nondum.host.assembly.base import Base
@@ -14,6 +13,7 @@ from nondum.host.people.stop_button.hook import StopHook
 from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
 from nondum.host.workers.workers import Workers
 from nondum.planning.words.stop_words import is_stop
+from nondum.sdk.frozen import frozen
 
 if TYPE_CHECKING:
     from nondum.host.peers.peer_services import PeerServices
@@ -22,7 +22,7 @@ StopAll: TypeAlias = Callable[[], Awaitable[Stopped]]
 """Stops this host, and the peers that go by what is said here."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StopParts:
     """What stops this host, and what it runs then."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 
 from nondum.host.assembly.base import Base
 from nondum.host.config.confinement_level import ConfinementState
@@ -17,11 +16,12 @@ from nondum.host.workers.launcher import WorkerLauncher
 from nondum.host.workers.spec import Timing
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import NondumError
+from nondum.sdk.frozen import frozen
 
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerParts:
     """What runs workers."""
 

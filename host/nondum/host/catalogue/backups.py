@@ -12,10 +12,10 @@ import logging
 import os
 import sqlite3
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.catalogue.database import CACHE
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import disk
 
 FOLDER = "backups"
@@ -26,7 +26,7 @@ SETTLED_S = 5.0
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Backups:
     """The copies of one catalogue."""
 

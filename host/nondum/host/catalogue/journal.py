@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.host.catalogue import rows
 from nondum.host.core.records.journal import JournalEntry
 from nondum.host.core.records.moment import Moment
+from nondum.sdk.frozen import frozen
 
 KEEP = 20_000
 """Entries that are kept, the last ones, unless the caller sets a number: some eight megabytes."""
@@ -20,7 +21,7 @@ PROBLEMS_LIMIT = 50
 """Problems of one entry: a payload may have thousands, and its record has them all."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Since:
     """A moment in the past, for entries of this run of the daemon and of others.
 

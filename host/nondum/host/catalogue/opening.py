@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sqlite3
 import time
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from nondum.host.catalogue import database
 from nondum.host.catalogue.backups import Backups
 from nondum.host.core.state import HostState
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import disk
 
 TRACES = ("store", "installed")
@@ -30,7 +30,7 @@ class Instead(Enum):
     """An empty one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Loss:
     """What became of a file that could not be used."""
 
@@ -41,7 +41,7 @@ class Loss:
     """Of what took its place."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Opened:
     """A catalogue's file that is open."""
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-from dataclasses import dataclass
 from pathlib import Path
+
+from nondum.sdk.frozen import frozen
 
 RESERVE_BYTES = 8 * 1024**2
 """More than SQLite's log grows to between two checkpoints."""
@@ -13,7 +14,7 @@ SPARE_BYTES = 4 * RESERVE_BYTES
 """So much must be free beside it before it is taken again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reserve:
     """A file that takes disk space until the catalogue needs it."""
 

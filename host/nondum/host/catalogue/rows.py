@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -252,14 +253,17 @@ def device(
     )
 
 
+_KNOWN_DEVICE = tuple(field.name for field in fields(KnownDevice))
+
+
 def known_device_row(known: KnownDevice) -> Row:
     """A row of `known_devices`."""
-    return {name: getattr(known, name) for name in KnownDevice.__slots__}
+    return {name: getattr(known, name) for name in _KNOWN_DEVICE}
 
 
 def known_device(row: sqlite3.Row) -> KnownDevice:
     """A known device of its row."""
-    return KnownDevice(**{name: row[name] for name in KnownDevice.__slots__})
+    return KnownDevice(**{name: row[name] for name in _KNOWN_DEVICE})
 
 
 def mount_row(mount: MountPose) -> Row:

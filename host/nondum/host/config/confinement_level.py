@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import confinement
 from nondum.wheelhouse.format.confinement import Level
 
@@ -27,7 +27,7 @@ def parse_wanted(value: object) -> Wanted:
     return "auto" if value == "auto" else confinement.parse(value)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Finding:
     """What trying one level out has shown."""
 
@@ -63,7 +63,7 @@ class Finding:
         return cls(level, is_available, row["reason"], row["fix"], bool(row.get("users")))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConfinementState:
     """At which level this host's workers run, and why not at a higher one."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,11 @@ from nondum.host.config import host_config, parsing
 from nondum.host.config.host_config import HostConfig
 from nondum.host.config.places import Places
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Asked:
     """What a command line says of the configuration."""
 
@@ -28,7 +28,7 @@ class Asked:
     peers: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Setting:
     """One key, and who says what it is."""
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from nondum.host.config.places import Places
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 LAMP = re.compile(r"[A-Za-z0-9_:.*?+@-]{1,64}")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FeedbackSection:
     """How people are shown the host's state who have no screen."""
 

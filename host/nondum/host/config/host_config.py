@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import socket
 from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -13,12 +13,13 @@ from nondum.host.config import control_sockets
 from nondum.host.config.confinement_level import Wanted
 from nondum.host.config.feedback_section import FeedbackSection
 from nondum.host.config.stop_section import StopSection
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
 
 SYSTEM_FILE = Path("/etc/nondum/host.toml")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostSection:
     """Who this host is, and where it keeps what it knows."""
 
@@ -33,7 +34,7 @@ class HostSection:
     """`package:function` that makes the system tree."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DrivesSection:
     """Where drives come from, and what is asked of them."""
 
@@ -50,7 +51,7 @@ class DrivesSection:
     much else to do."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustSection:
     """Whose payloads are run."""
 
@@ -62,7 +63,7 @@ class TrustSection:
     `flag`: it is told only."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DevicesSection:
     """Where devices come from."""
 
@@ -72,7 +73,7 @@ class DevicesSection:
     """Follow the machine's own devices."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JournalSection:
     """What is kept of what happened."""
 
@@ -80,7 +81,7 @@ class JournalSection:
     """Entries; of older ones the oldest go first. At least 1000 are kept."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BackupsSection:
     """Copies of the catalogue, for the day on which its file is damaged."""
 
@@ -88,7 +89,7 @@ class BackupsSection:
     """Time between two, if anything changed; the last two are kept."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstallSection:
     """How payloads become venvs."""
 
@@ -100,7 +101,7 @@ class InstallSection:
     """Size that the store is pruned to, least recently used first."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkersSection:
     """Limits of each worker: the same for all, and no payload changes them."""
 
@@ -129,7 +130,7 @@ class WorkersSection:
     it is `none`, and every status says so."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlanningSection:
     """How plans are searched for."""
 
@@ -149,7 +150,7 @@ class PlanningSection:
     it has failed."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeersSection:
     """Other hosts: whether they are looked for, and what they may have of this one."""
 
@@ -180,7 +181,7 @@ class PeersSection:
     a router is named, `false` by default: no peer proves its key there."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RouterSection:
     """A Zenoh router by which hosts reach each other, instead of links from each to each."""
 
@@ -196,7 +197,7 @@ class RouterSection:
     """Its key (PEM)."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostConfig:
     """All of it."""
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from nondum.host.config.places import Places
 from nondum.host.config.stop_keys import code_of
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 DEVICE = re.compile(r"/dev/input/((by-id|by-path)/[A-Za-z0-9_.:+@-]{1,200}|event[0-9]{1,4})")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StopSection:
     """What stops the robot beside the word, and what is told of it; see docs/stopping.md."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -14,9 +13,10 @@ from nondum.host.control.rows import (
 from nondum.host.core.row import Row
 from nondum.host.sources.devices import view
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceQuestions:
     """Each method is a verb; none changes anything."""
 

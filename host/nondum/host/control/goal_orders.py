@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any, cast, get_args
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -27,12 +26,13 @@ from nondum.host.workers.workers import Workers
 from nondum.planning.merge.goal import GoalKind
 from nondum.planning.words.stop_words import is_stop
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 NOT_YET = translation.UNMATCHED | {"GOAL_TOO_EARLY"}
 """Refusals of words that may mean something once more has come."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalOrders:
     """Each method that takes arguments is a verb."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any, cast
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -18,12 +17,13 @@ from nondum.host.core.row import Row
 from nondum.host.core.unknown import unknown
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import NondumError
+from nondum.sdk.frozen import frozen
 
 MOST_JOURNAL_ROWS = 100_000
 LONGEST_AGO_S = 100 * 366 * 86_400
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LogQuestions:
     """Each method is a verb; none changes anything."""
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.codec.values import to_plain
+from nondum.sdk.frozen import frozen
 
 MEGABYTE = 1 << 20
 LOW_PERCENT = 20
@@ -30,7 +30,7 @@ _LIKELY_C = (-50.0, 200.0)
 _LIMITS = frozenset({"hot", "critical"})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Battery:
     """A battery that the machine runs on."""
 
@@ -41,7 +41,7 @@ class Battery:
     """`charging`, `discharging`, `full`, `not charging`, `unknown`: the kernel's words."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Disk:
     """The disk that the host's state is on."""
 
@@ -53,7 +53,7 @@ class Disk:
     """What is kept free, whatever is plugged in."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Temperature:
     """What a thermal zone says."""
 
@@ -69,7 +69,7 @@ class Temperature:
         return self.celsius >= near
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Load:
     """How many processes run or would, on average."""
 
@@ -79,7 +79,7 @@ class Load:
     processors: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Machine:
     """How it is now; what it does not tell is not there."""
 

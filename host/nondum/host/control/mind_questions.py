@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -21,6 +20,7 @@ from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
 from nondum.host.sources.devices import view
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 LOOK_S = 0.5
 """What is followed is looked at no more often: goals and facts take their time."""
@@ -28,7 +28,7 @@ LOOK_S = 0.5
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MindQuestions:
     """Each method is a verb; none changes anything."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -19,11 +18,12 @@ from nondum.host.core.unknown import unknown
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.mind import Mind
 from nondum.sdk.errors import ConfigRefused
+from nondum.sdk.frozen import frozen
 
 _ZEROS: Triple = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MountOrders:
     """Each method is a verb."""
 

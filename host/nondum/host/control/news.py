@@ -6,18 +6,18 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.core.events.drives import DriveQueued
 from nondum.host.core.events.event import Event
 from nondum.host.core.events.payloads import ProgressMade
+from nondum.sdk.frozen import frozen
 
 PROGRESS_S = 0.1
 """Progress within one phase is told no more often: a view costs more than a step of copying."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Progress:
     """How far a payload is within the step that it is at."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +26,10 @@ from nondum.host.core.unknown import unknown
 from nondum.host.lifecycle.retry_rules import is_quarantined
 from nondum.host.manager import initial_components, rollback
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadOrders:
     """Each method is a verb."""
 

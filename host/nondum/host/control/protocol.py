@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 
 LINE_LIMIT = 8 * 1024 * 1024
 """Bytes in one line; a catalogue of hundreds of components stays far below."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Request:
     """What one client asks."""
 

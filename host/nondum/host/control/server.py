@@ -10,13 +10,13 @@ import logging
 import os
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nondum.host.control import protocol
 from nondum.host.control.shortage import AcceptFailures
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 Verb = Callable[[Mapping[str, Any]], Awaitable[Any]]
@@ -30,7 +30,7 @@ MODE = 0o660
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Handing:
     """An answer that a descriptor goes along with: `connection`, closed here once it is sent."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -25,12 +24,13 @@ from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
 from nondum.host.trust.vouched import Vouched
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 TOLD = 50
 """How many of the last sentences told to people are shown."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StatusQuestions:
     """Each method is a verb; none changes anything."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -20,10 +19,11 @@ from nondum.host.mind.mind import Mind
 from nondum.host.workers.optional_inputs import Socket
 from nondum.host.workers.workers import Workers
 from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport import link_sockets
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StreamOrders:
     """Each method is a verb."""
 

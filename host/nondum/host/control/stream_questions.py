@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
@@ -13,9 +12,10 @@ from nondum.host.control.rows import (
 )
 from nondum.host.core.row import Row
 from nondum.host.workers.workers import Workers
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StreamQuestions:
     """Each method is a verb; none changes anything."""
 

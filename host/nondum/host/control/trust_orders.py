@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
 from nondum.host.core.events.event import Emit, Event
 from nondum.host.manager.payload_trust import PayloadTrust
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.trust import trust_file
 from nondum.wheelhouse.trust.succession import SignedFile
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustOrders:
     """Each method is a verb."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.control.arguments import Arguments
@@ -14,13 +13,14 @@ from nondum.host.control.status_questions import StatusQuestions
 from nondum.host.control.stream_questions import StreamQuestions
 from nondum.host.core.row import Row
 from nondum.host.mind.mind import Mind
+from nondum.sdk.frozen import frozen
 
 LONGEST_EVERY_S = 3600
 
 Version = tuple[int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Watching:
     """Each method that takes arguments is a verb; none changes anything."""
 

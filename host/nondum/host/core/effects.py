@@ -6,18 +6,19 @@ Each is idempotent: after a crash it may be carried out again from the start.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from nondum.host.core.records.device import DeviceNode
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Effect:
     """Anything to be done."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ReadDrive(Effect):
     """Mount the drive where it needs that, and look for payloads on it."""
 
@@ -30,28 +31,28 @@ class ReadDrive(Effect):
     """Digest of a contents list → key of the payload that is here already."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ReleaseDrive(Effect):
     """Let go of a drive: end its reader, unmount it."""
 
     drive: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class JudgePayloads(Effect):
     """Check again whether payloads that are here are trusted."""
 
     payloads: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadEffect(Effect):
     """Something to be done for one payload; one at a time for each."""
 
     payload: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CopyPayload(PayloadEffect):
     """Copy what this host needs into staging, hashing on the way."""
 
@@ -62,17 +63,17 @@ class CopyPayload(PayloadEffect):
     """Key of its active release, whose memory would become free for it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class VerifyPayload(PayloadEffect):
     """Check the staged copy: manifest, locks, index, wheels, preflight."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StagePayload(PayloadEffect):
     """Move the checked copy to its lasting place."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StoreWheels(PayloadEffect):
     """Unpack each wheel that the store lacks into it, and reserve the memory that it needs."""
 
@@ -82,7 +83,7 @@ class StoreWheels(PayloadEffect):
     """Id in the manifest → name on this host, of those components where that is another."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProbeComponents(PayloadEffect):
     """Make the venvs, start the workers, compare what they say with the index."""
 
@@ -94,7 +95,7 @@ class ProbeComponents(PayloadEffect):
     """Id in the manifest → name on this host, of those components where that is another."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ActivatePayload(PayloadEffect):
     """Make the components' records for the catalogue."""
 
@@ -102,19 +103,19 @@ class ActivatePayload(PayloadEffect):
     """Key of the release that it is to take over from, once it was seen to be healthy."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CompileWheels(PayloadEffect):
     """Byte-compile what an active payload runs, for the next start; it may fail or never end."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RestPayload(PayloadEffect):
     """Stop what runs of a superseded payload; it may be wanted again at once."""
 
     components: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NoteInstalled(PayloadEffect):
     """Write down beside a payload's files that it was installed for good, or undo that."""
 
@@ -123,28 +124,28 @@ class NoteInstalled(PayloadEffect):
     """Where it came from; None: it is not installed for good any more."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SuspendPayload(PayloadEffect):
     """Stop what runs of a quarantined payload and drop its venvs; it may be tried again."""
 
     components: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ClearPayload(PayloadEffect):
     """Stop what runs of a payload and delete all of it but the wheels in the store."""
 
     components: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RestartWorker(Effect):
     """Start a quarantined component's worker once more."""
 
     component: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AttachDevice(Effect):
     """Give nodes of a device to a component: these, instead of any that it has for that need."""
 
@@ -153,7 +154,7 @@ class AttachDevice(Effect):
     nodes: tuple[DeviceNode, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DetachDevice(Effect):
     """Take a device from a component."""
 

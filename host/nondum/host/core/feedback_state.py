@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+
+from nondum.sdk.frozen import frozen
 
 
 class State(Enum):
@@ -25,7 +26,7 @@ PRIORITY = tuple(State)
 """The first state that anything asks for is shown."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StateReason:
     """One reason for a state."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from nondum.host.core import payload_key
 from nondum.host.core.records.component import ComponentRecord
@@ -16,9 +16,10 @@ from nondum.host.core.records.peer import PeerRecord
 from nondum.host.core.records.safety import Safety
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.planning.merge.given_names import GivenNames
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Highwater:
     """The newest release of a payload that was ever active here; kept for ever."""
 
@@ -28,7 +29,7 @@ class Highwater:
     """The role of the trust file by which it was the first to come in; empty: none was asked."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostState:
     """A host at one moment. Mappings are by id (payloads by key) and are never changed in place."""
 

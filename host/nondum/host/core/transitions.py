@@ -7,7 +7,6 @@ diagram in docs/lifecycle.md is drawn from them, and the kill tests go through e
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from nondum.host.core import effects
 from nondum.host.core.effects import PayloadEffect
@@ -33,9 +32,10 @@ from nondum.host.core.events.trust import PayloadDistrusted
 from nondum.host.core.events.workers import WorkerExited, WorkerFailed, WorkerReady
 from nondum.host.core.records.component import ComponentState
 from nondum.host.core.records.step import Step
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Transition:
     """Where an event leads, and what is then to be done."""
 

@@ -7,7 +7,6 @@ environment of the daemon: it runs in the daemon's process and is trusted, and m
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
@@ -17,6 +16,7 @@ from nondum.host.config.host_config import HostConfig
 from nondum.host.core.events.event import Emit
 from nondum.host.core.feedback_state import StateReason
 from nondum.host.core.records.snapshot import Snapshot
+from nondum.sdk.frozen import frozen
 
 if TYPE_CHECKING:  # a host without peers loads none of it
     from nondum.transport.fleet import Find, Fleet, FleetEvent
@@ -49,7 +49,7 @@ class Say(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Host:
     """What an extension may know and use of the host that it runs in."""
 
@@ -65,7 +65,7 @@ class Host:
     """The newest sentences that people were told, the newest last."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FleetMember:
     """What this host brings into a fleet."""
 

@@ -7,15 +7,15 @@ import math
 import re
 import resource
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.contents import MAX_FILE_BYTES, MAX_FILES
 
 _MB = 1024 * 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Allowance:
     """The most that one job may take."""
 

@@ -17,8 +17,9 @@ import select
 import signal
 import socket
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+
+from nondum.sdk.frozen import frozen
 
 REQUEST_BYTES = 1 << 20
 MOST_DESCRIPTORS = 4
@@ -96,7 +97,7 @@ def serve(
 _NO_STEP = object()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Request:
     message: bytes
     descriptors: Sequence[int]
@@ -111,7 +112,7 @@ def _received(channel: socket.socket) -> _Request | None:
     return _Request(message, found) if message else None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Child:
     pid: int
     status: int

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.description import DeviceNeed, PluginDescription
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.manifest import UnitMount
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstalledComponent:
     """What its worker can be started from; a child process tells it, and the daemon reads it."""
 

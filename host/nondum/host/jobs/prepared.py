@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,10 @@ from nondum.host.jobs.installed_component import InstalledComponent
 from nondum.host.workers.spec import Limits, WorkerSpec, base_interpreter
 from nondum.planning.merge.contribution import object_name
 from nondum.sdk.codec.values import from_plain
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Prepared(InstalledComponent):
     """One component, installed and not yet active; its id is its name on this host."""
 

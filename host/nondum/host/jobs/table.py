@@ -7,9 +7,10 @@ job need not wait for what others import.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
+
+from nondum.sdk.frozen import frozen
 
 Arguments = Mapping[str, Any]
 Report = Callable[[str, int, int], None]
@@ -22,7 +23,7 @@ PROGRESS = "progress"
 """The event that a job is so far (`Progress`)."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Progress:
     """How far a job is."""
 

@@ -8,7 +8,6 @@ fleet is upgraded host by host.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
@@ -20,6 +19,7 @@ from nondum.planning.merge.merge import merge
 from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 Index = Mapping[str, PluginDescription]
 """Component id → what its plugin says."""
@@ -50,7 +50,7 @@ def _losses(state: HostState, old: PayloadRecord, index: Index) -> tuple[Problem
     return (*(problem for found in kept_out for problem in found), *said_wrongly)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Found:
     """What is wrong in one merge."""
 

@@ -7,7 +7,7 @@ the cause is gone the host tries again by itself; later and later, where that is
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 from nondum.host.core.records.drive import DriveRecord, DriveState
@@ -15,6 +15,7 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.records.step import Step
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 FIRST_S = 5.0
 """From a refusal until the first try."""
@@ -74,7 +75,7 @@ MOST_READINGS = 5
 """How often such a drive is read again by itself."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Amounts:
     """What this host has now, as far as payloads were refused for it."""
 
@@ -100,7 +101,7 @@ class Amounts:
                 return 0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Waiting:
     """A refused payload of which the causes may go away."""
 
@@ -110,7 +111,7 @@ class Waiting:
     tries: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unread:
     """A drive that the helper did not get to."""
 
@@ -120,7 +121,7 @@ class Unread:
     """How often it was read again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Due:
     """A payload that is to be tried now."""
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.codec.values import from_plain
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.payload.memory import Memory
 
 RESERVE_MB = 64
@@ -16,7 +16,7 @@ RESERVE_MB = 64
 _PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Needs:
     """The memory that a payload needs, as its manifest says."""
 

@@ -10,7 +10,7 @@ import logging
 import shutil
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,7 @@ from nondum.host.workers.spec import Limits, base_interpreter
 from nondum.host.workers.workers import Workers
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.payload.memory import Memory, Promised, free_memory_mb
 from nondum.wheelhouse.store import disk
 
@@ -67,7 +68,7 @@ is for deleting."""
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstallOptions:
     """How payloads are judged and installed on this host."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,12 @@ from nondum.host.core.records.mount import MountPose
 from nondum.host.jobs.prepared import Prepared
 from nondum.host.manager.headroom import Needs
 from nondum.host.workers.spec import Limits, WorkerSpec
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.signatures import Grant
 from nondum.wheelhouse.payload.gpu import Gpu
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InstalledPayload:
     """What its workers are started from, what it needs, and what it may have."""
 

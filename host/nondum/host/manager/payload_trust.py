@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from nondum.host.trust import anchors, chain
 from nondum.host.trust.rules import Rules, parsed
 from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.sdk.errors import NondumError, Problem, TrustRefused
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.trust.judging import clock_floor
 from nondum.wheelhouse.trust.succession import SignedFile
@@ -42,7 +42,7 @@ MOST_TOLD = 8
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustOptions:
     """Where a host's trust begins, and what becomes of payloads that lose it."""
 

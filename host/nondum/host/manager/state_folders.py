@@ -6,13 +6,13 @@ import logging
 import os
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.core.state import HostState
 from nondum.host.core.transitions import KEEPS_FOLDER, KEEPS_VENVS
 from nondum.host.sandbox.helper import privileged
 from nondum.host.workers import scratch
+from nondum.sdk.frozen import frozen
 
 PRIVATE, PASSABLE = 0o700, 0o711
 PRIVATE_FILE = 0o600
@@ -21,7 +21,7 @@ PRIVATE_FILE = 0o600
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Folders:
     """The state folder and what is in it."""
 

@@ -18,11 +18,11 @@ import os
 import signal
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.core.printable import printable
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import disk
 
 ENDING_S = 10.0
@@ -48,7 +48,7 @@ and opening such a file again would drop its lock."""
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Holder:
     """The process that has the lock."""
 

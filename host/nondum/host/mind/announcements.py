@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from nondum.host.core import missing_devices
@@ -16,6 +16,7 @@ from nondum.host.core.records.peer import PeerComponent
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.frames import mount_warnings
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 MAX_SENTENCES = 1000
 MAX_CHARACTERS = 4096
@@ -28,7 +29,7 @@ NEWEST = 3
 """Sentences that are looked at where only the last ones count."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Told:
     """One sentence."""
 

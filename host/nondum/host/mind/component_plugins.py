@@ -8,7 +8,6 @@ where the component does not answer. Each answer says which component gave it.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
 import pluggy
@@ -27,6 +26,7 @@ from nondum.sdk.description import (
     Phrase,
     Unit,
 )
+from nondum.sdk.frozen import frozen
 from nondum.sdk.hooks import hookimpl
 
 Answer: TypeAlias = Awaitable[Mapping[str, Any] | None]
@@ -35,7 +35,7 @@ Ask: TypeAlias = Callable[[str, str, Mapping[str, Any]], Answer]
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Said(Generic[_T]):
     """What one component answers."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.peer import PeerComponent
@@ -15,9 +14,10 @@ from nondum.planning.merge.merge import merge
 from nondum.planning.pddl.facts import fact
 from nondum.planning.words.phrases import Phrasebook, phrasebook
 from nondum.sdk.description import ACTUATORS, PluginDescription
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Composition:
     """One revision of the catalogue, merged."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from nondum.host.core.records.payload import FormerPayload
 from nondum.host.core.records.snapshot import Snapshot
@@ -20,6 +19,7 @@ from nondum.planning.merge.goal import Goal
 from nondum.planning.search import solve
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import Answer, GroundTask
 
 NO_SILENCE = Silence()
@@ -28,7 +28,7 @@ _TRIAL_S = 0.3
 """How long a part of a goal is planned for, to see whether it can be had by itself."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WhyNot:
     """Why a goal cannot be had."""
 
@@ -39,7 +39,7 @@ class WhyNot:
     each other."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Seen:
     """A component that was here, as it was last."""
 

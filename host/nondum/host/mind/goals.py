@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 
 from nondum.host.core.records.goal import GoalRecord
 from nondum.host.mind.lack import Need
 from nondum.planning.merge.goal import GoalKind
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 HIGHEST_PRIORITY = 1000
 MAX_ENDED = 50
@@ -38,7 +39,7 @@ class GoalState(Enum):
         return self in (GoalState.REACHED, GoalState.HALTED)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GivenGoal:
     """A goal as it stands."""
 

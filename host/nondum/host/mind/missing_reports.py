@@ -7,7 +7,7 @@ What planning says of such a fact, that nothing here makes it true, holds of act
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias, cast
 
 from nondum.host.core import missing_devices
@@ -21,9 +21,10 @@ from nondum.planning.merge.contribution import object_name
 from nondum.planning.pddl.facts import parts
 from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reason:
     """What keeps a component from telling, or from being ready."""
 
@@ -36,7 +37,7 @@ class Reason:
 Reasons: TypeAlias = Mapping[str, tuple[Reason, ...]]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Silence:
     """What of a host's components tells nothing, or is not ready, and why."""
 

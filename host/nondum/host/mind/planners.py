@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -22,6 +21,7 @@ from nondum.planning.ground.delete_relaxation import quick_answer
 from nondum.planning.ground.plan_text import plan_of
 from nondum.planning.search.validate import validate
 from nondum.sdk.errors import PlannerFailed, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import (
     AlreadyTrue,
     Answer,
@@ -40,7 +40,7 @@ CHEAPER_S = 0.3
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Found:
     """What came of a search."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
@@ -27,6 +27,7 @@ from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.goal import Goal, goal_problems, parse_goal
 from nondum.planning.search.interruptions import cut_short
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import AlreadyTrue, GaveUp, GroundTask, Plan, Unsolvable
 
 BESIDE_S = 2.0
@@ -90,7 +91,7 @@ async def search(
 _Narrowing: TypeAlias = Callable[[GroundTask], GroundTask]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Searching:
     """Searches for plans for one goal."""
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
 from nondum.host.mind.diagnosis import Seen
 from nondum.host.mind.lack import Need
 from nondum.planning.execute.independence import Reservation
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundTask, Plan
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OtherPlans:
     """The plans that are carried out for other goals."""
 
@@ -32,7 +33,7 @@ class OtherPlans:
         return self.firm + self.yielding
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Situation:
     """What a search depends on: the same situation gives the same answer."""
 
@@ -53,7 +54,7 @@ class Situation:
         return self.goal, self.revision, self.excluded, self.others.firm, self.others.yielding
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Planned:
     """A plan for a goal, in the task that it is valid in."""
 
@@ -75,7 +76,7 @@ class Planned:
         return tuple(self.task.actions[step].name for step in self.plan.steps)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NoPlan:
     """There is none, or none was found; the problems say why."""
 
@@ -87,7 +88,7 @@ class NoPlan:
     """What is missing, as far as that is why."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Waits:
     """There is a plan, and more urgent goals keep it from being carried out."""
 
@@ -101,7 +102,7 @@ class Waits:
 Outcome: TypeAlias = Planned | NoPlan | Waits
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Past:
     """What is remembered from before a search."""
 

@@ -9,7 +9,6 @@ not block.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol, TypeAlias
 
@@ -19,6 +18,7 @@ from py_trees.composites import Composite, Parallel
 
 from nondum.planning.execute.task_tree import TaskTree
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.frozen import frozen
 
 
 class Duty(Behaviour):
@@ -117,7 +117,7 @@ class MakesLeaves(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Parts:
     """What a system tree is composed of. Each node may stand in the tree once."""
 

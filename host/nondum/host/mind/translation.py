@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass
 from itertools import islice
 from typing import Any, TypeAlias, cast, get_args
 
@@ -18,6 +17,7 @@ from nondum.planning.merge.domain import Predicate
 from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.syntax import type_text
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 UNMATCHED = frozenset({"PHRASE_UNKNOWN", "PHRASE_WORDS_UNKNOWN"})
 """Refusals of words that a translator may still understand; it is not asked of ambiguous ones."""
@@ -34,7 +34,7 @@ Asked: TypeAlias = Callable[[Vocabulary], Answers]
 """Asks all components at once."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Understood:
     """What components take a sentence to mean."""
 

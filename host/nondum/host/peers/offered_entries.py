@@ -16,7 +16,7 @@ phrases and labels. So peers understand what they cannot do, and know who can.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from nondum.host.core.events.facts import FactKnown, StreamFlowing
@@ -26,12 +26,13 @@ from nondum.host.mind.composition import Composition, own_objects
 from nondum.planning.merge.scope import SELF
 from nondum.planning.pddl.facts import fact
 from nondum.sdk.description import ACTUATORS, PluginDescription
+from nondum.sdk.frozen import frozen
 
 Entries: TypeAlias = dict[str, dict[str, Any]]
 Claim: TypeAlias = FactKnown | StreamFlowing
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Offer:
     """A component as peers may have it."""
 
@@ -44,7 +45,7 @@ class Offer:
         return any(found.name == behaviour for found in self.description.behaviours)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Policy:
     """What the integrator allows."""
 

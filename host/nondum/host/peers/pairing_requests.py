@@ -6,12 +6,12 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncGenerator, Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from nondum.host.core.row import Row
 from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint
 from nondum.transport.peers.pairing_channel import PairingHost
@@ -49,7 +49,7 @@ class Hint(Protocol):
         """Where it can be asked, while it can be paired."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Candidate:
     """A host whose person has a window open, too."""
 

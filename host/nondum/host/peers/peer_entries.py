@@ -9,7 +9,6 @@ import ipaddress
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from nondum.host.core.events.facts import FactForgotten, FactKnown, StreamFlowing
@@ -21,6 +20,7 @@ from nondum.planning.merge.core import TAKEN_PREDICATES
 from nondum.planning.pddl.facts import parts
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import MessageInvalid, NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import value_from_wire
 from nondum.sdk.signature import parse_signature
 
@@ -37,7 +37,7 @@ _FACT = re.compile(r"[^\s()]+ [^\s()]+")
 _WORD = re.compile(r"[^\s()]{1,256}")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Introduced:
     """Who a peer is."""
 

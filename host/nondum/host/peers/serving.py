@@ -24,6 +24,7 @@ from nondum.host.peers.uses import taken_by
 from nondum.host.workers.call import Call
 from nondum.planning.execute.running import RunState
 from nondum.sdk.errors import MessageInvalid, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import value_from_wire
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.wire import Body
@@ -54,7 +55,7 @@ class Behaves(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Asked:
     """What a peer wants of a component."""
 

@@ -7,7 +7,7 @@ verbs |= trust_orders.following(orders)      # in `verbs.following`
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -16,6 +16,7 @@ from nondum.host.core.row import Row
 from nondum.host.peers.pairing_requests import PairingRequests
 from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.certificate import check_name
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, fingerprint, parse_key
@@ -25,7 +26,7 @@ MOST_WORDS = 200
 """Characters that are kept of why a key was revoked."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustOrders:
     """Each method is a verb."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from nondum.host.core.elsewhere import Elsewhere
@@ -29,6 +29,7 @@ from nondum.host.mind.translation import Understood
 from nondum.host.people.conversation import given_goal
 from nondum.host.people.feedback.state_reasons import refusal
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +40,7 @@ Translate: TypeAlias = Callable[[str, GoalRefused], Awaitable[Understood]]
 """Words, and why they match no phrase → what components take them to mean."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Wish:
     """One line of a goal.txt, or words of a person."""
 

@@ -6,7 +6,7 @@ It needs no planner, no payload and no peer. Software is no emergency stop: docs
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from nondum.host.mind.mind import Mind
@@ -19,9 +19,10 @@ from nondum.planning.words.stop_words import (
     is_stop_for_other,
 )
 from nondum.sdk.errors import GoalRefused
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stopped:
     """What was stopped."""
 

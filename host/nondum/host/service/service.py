@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 from nondum.host.core.events.daemon import HostStarted
 from nondum.host.core.events.event import Event
 from nondum.host.service.notify import Notifier
+from nondum.sdk.frozen import frozen
 
 SIGNS = 4
 """Signs of life within the time that is allowed for one."""
@@ -30,7 +30,7 @@ _V = TypeVar("_V")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Part:
     """A part of the daemon that must get on."""
 

@@ -14,12 +14,12 @@ import errno
 import os
 import secrets
 import stat
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import BinaryIO
 
 from nondum.sdk.errors import Problem, TrustRefused
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import disk
 from nondum.wheelhouse.trust import sshsig, succession, trust_file
 from nondum.wheelhouse.trust.succession import SignedFile
@@ -42,7 +42,7 @@ class Origin(Enum):
     USER = "unsigned, placed by the user that this host runs as"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Anchor:
     """A first trust file that is believed."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.signatures import Verifier
 from nondum.wheelhouse.trust import succession, trust_file
 from nondum.wheelhouse.trust.judging import Circumstances, Developing, Judging
@@ -15,7 +16,7 @@ from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Trust
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rules:
     """What stands for a host when it is judged for it elsewhere."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.core import core_graph, core_predicates
@@ -18,12 +17,13 @@ from nondum.planning.merge.merge import merge
 from nondum.planning.words.phrases import phrasebook
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 HOST = "host"
 """Any host: names of hosts mean nothing to a fragment."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Judged:
     """What merging a payload alone shows."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from datetime import datetime
 
+from nondum.sdk.frozen import frozen
 
-@dataclass(frozen=True, slots=True)
+
+@frozen
 class Vouched:
     """What is known of it, as far as it was asked."""
 

@@ -6,7 +6,6 @@ import base64
 import os
 from collections.abc import Collection, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,13 +14,14 @@ from nondum.host.sandbox.levels.bubblewrap import Ground
 from nondum.host.sandbox.levels.filters import Rule
 from nondum.host.sandbox.levels.users import NewNamespace
 from nondum.host.workers.spec import WorkerSpec
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
 
 BOOTSTRAP = bubblewrap.INSIDE / "bootstrap.py"
 EVERYWHERE = (Path("/"),)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Entry:
     """How one interpreter becomes one worker."""
 

@@ -12,12 +12,12 @@ import json
 import os
 import socket
 import struct
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.sandbox.inside.mounts import DEVICES
 from nondum.host.workers import scratch
 from nondum.sdk.errors import Problem, WorkerFailed
+from nondum.sdk.frozen import frozen
 
 ANSWER_S = 2.0
 """How long one order may take."""
@@ -28,7 +28,7 @@ CREDENTIALS = struct.Struct("=iII")
 """`struct ucred` (unix(7)): process, user, group."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OpenFiles:
     """What the processes of a sandbox have open."""
 

@@ -14,6 +14,7 @@ from nondum.host.sandbox.cgroups import Usage
 from nondum.host.workers import problems
 from nondum.host.workers.spec import Limits, Timing
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 REFUSALS = 1000
 """Processes and threads refused without a reading at which none was: it forks for its life."""
@@ -25,7 +26,7 @@ SPARED = 3
 """Descriptors below the limit at which there are none left to work with."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reading:
     """What a worker uses at one moment."""
 
@@ -40,7 +41,7 @@ class Reading:
     """Whether a behaviour of its runs or a stream of its flows."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Excess:
     """What is too much, by the code it is told with."""
 

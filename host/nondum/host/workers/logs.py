@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from nondum.host.core.records.moment import Moment
+from nondum.sdk.frozen import frozen
 
 LINES = 1000
 """Lines that are kept of one component."""
@@ -15,7 +15,7 @@ COMPONENTS = 256
 """Components that lines are kept of."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LogLine:
     """One line."""
 

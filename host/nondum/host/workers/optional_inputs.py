@@ -14,6 +14,7 @@ from nondum.planning.merge.contribution import object_name
 from nondum.planning.merge.kinds import kinds_of
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport import Wire
 
 
@@ -29,7 +30,7 @@ class Source:
     """The types of unit that it tells of."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Socket:
     """An optional input."""
 
@@ -54,7 +55,7 @@ class Socket:
         return self.takes(source) and self.of in ("", *source.of)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Choice:
     """What feeds one optional input now."""
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from nondum.host.sandbox.cgroups import CgroupLimits
 from nondum.planning.merge.contribution import object_name
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Limits:
     """What one worker may use."""
 
@@ -40,7 +41,7 @@ class Limits:
         return CgroupLimits(self.memory_mb, self.tasks, processors=self.processors)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Timing:
     """How long a worker is waited for, in seconds."""
 
@@ -71,7 +72,7 @@ class Timing:
         return self.heartbeat_s * self.missed
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerSpec:
     """One component's worker."""
 

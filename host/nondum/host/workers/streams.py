@@ -13,7 +13,6 @@ import logging
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from socket import socket as Connection
 from typing import Protocol
 
@@ -27,6 +26,7 @@ from nondum.host.workers.optional_inputs import (
 )
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import MESSAGES
 from nondum.sdk.signature import parse_signature
 from nondum.transport import StreamBroker, Wire, WorkerLink
@@ -34,7 +34,7 @@ from nondum.transport import StreamBroker, Wire, WorkerLink
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StreamStatus:
     """A stream as people see it."""
 
@@ -72,7 +72,7 @@ class Remote(Protocol):
         """Feed a reader no more; unknown ones are ignored."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Member:
     """A component whose worker runs."""
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from nondum.sdk.frozen import frozen
 
 RESTARTS = 3
 """Within `WINDOW_S`; the next crash is one too many."""
 WINDOW_S = 60.0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Supervision:
     """The crashes of one component's worker that still count. An expected end is none."""
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from nondum.planning.execute.running import Run
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 COOL_DOWN_S = 30.0
 """How long an action that failed again and again is left out of plans."""
@@ -13,7 +14,7 @@ LONGEST_COOL_DOWN_S = 600.0
 """The same for one that goes on failing whenever it is tried again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Patience:
     """When to give an action up."""
 
@@ -30,7 +31,7 @@ class Patience:
     """A lasting behaviour that held this long starts with a clean slate when it dies."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Setback:
     """An action that was given up."""
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from nondum.planning.execute.running import World
 from nondum.planning.execute.step import Step
 from nondum.planning.pddl.facts import is_twin, twin
+from nondum.sdk.frozen import frozen
 
 Glimpse: TypeAlias = tuple[frozenset[str], frozenset[str]]
 """What matters and is so, and what would be so if all that is established had ended."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Narrow:
     """A world without what does not matter. Satisfies `running.World`."""
 

@@ -8,13 +8,13 @@ and behaviours that only hold each other up fall.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 
 from nondum.planning.execute.running import Run, RunState, World
 from nondum.planning.pddl.facts import is_twin, twin
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Footing:
     """What can be counted on at one moment."""
 

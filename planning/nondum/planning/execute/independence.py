@@ -8,17 +8,18 @@ keeps true by itself another may rely on.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.planning.execute.step import Step
 from nondum.planning.pddl.facts import is_twin, parts, predicate_of, twin
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundAction, GroundTask
 
 _UNIT_IS_TAKEN = frozenset({"idle", "free"})
 """Predicates of `nondum-core` that an action deletes to take what they are about."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reservation:
     """What a plan needs for itself as long as its goal is pursued."""
 

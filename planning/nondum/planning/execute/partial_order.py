@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from nondum.planning.execute.step import Step
+from nondum.sdk.frozen import frozen
 
 GOAL = -1
 """Stands for the goal where a consumer's index is asked for."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CausalLink:
     """A fact that a step (or the goal) needs, and the step that it comes from."""
 
@@ -28,7 +28,7 @@ class CausalLink:
     """Index of the last step before it that adds the fact; None: it holds from the start."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PartialOrder:
     """The plan's steps without the order that does not matter."""
 
@@ -50,7 +50,7 @@ class PartialOrder:
         return (index for index in bits(steps) if not self.after[index] & steps)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Threat:
     """A step that ends a lasting one whose effect is needed afterwards."""
 

@@ -8,7 +8,6 @@ same decision.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.execute.attempts import Attempts, Patience, Setbacks
@@ -19,6 +18,7 @@ from nondum.planning.execute.regression import Regression, Rest, Stuck
 from nondum.planning.execute.running import Run, RunState, World
 from nondum.planning.execute.step import Step
 from nondum.planning.merge.goal import GoalKind
+from nondum.sdk.frozen import frozen
 
 GOAL_REACHED = "the goal is reached"
 NOT_NEEDED = "nothing that is left to do needs it"
@@ -37,7 +37,7 @@ class Phase(Enum):
     """The plan does not fit the world any more, or one of its actions keeps failing."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Past:
     """A run that has ended."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from typing import Any, TypeAlias
 
 from nondum.planning.ground.rivals import Weight, group_of
+from nondum.sdk.frozen import frozen
 
 
 class SourceKind(Enum):
@@ -25,7 +26,7 @@ class SourceKind(Enum):
     """A component's problem fragment: a default, applied once, when the component appears."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Source:
     """One voice's word for or against a fact."""
 
@@ -81,7 +82,7 @@ def weight(pro: Source, *, is_observed: bool) -> Weight:
     return rank, *pro.moment
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Overlay:
     """The effects of an established lasting behaviour."""
 
@@ -97,7 +98,7 @@ class Overlay:
             yield replace(self.source, is_against=True)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Evidence:
     """All that is known about one fact."""
 

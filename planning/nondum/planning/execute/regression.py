@@ -9,7 +9,6 @@ Triangle tables (Fikes, Hart and Nilsson 1972), for partial orders (Muise, McIlr
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
 
 from nondum.planning.execute.partial_order import (
     GOAL,
@@ -20,9 +19,10 @@ from nondum.planning.execute.partial_order import (
     partial_order,
 )
 from nondum.planning.execute.step import Step
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rest:
     """The steps that are still to do; they reach the goal from here."""
 
@@ -30,7 +30,7 @@ class Rest:
     """Bit mask over the plan's steps; 0: the goal holds."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stuck:
     """No rest of the plan is supported: these facts are needed and no step of it gives them."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundAction, GroundTask, Plan
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Step:
     """An action of a plan and what it means for facts as text."""
 

@@ -6,12 +6,12 @@ Nothing is decided here.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.execute.partial_order import GOAL, CausalLink
 from nondum.planning.execute.plan_executive import PlanExecutive, in_words
 from nondum.planning.execute.running import Run
+from nondum.sdk.frozen import frozen
 
 
 class StepState(Enum):
@@ -35,7 +35,7 @@ class StepState(Enum):
     """It failed too often; the plan is stuck over it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StepStatus:
     """Where a step is, and why."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.syntax import type_text
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
 class Lack(Enum):
@@ -30,7 +30,7 @@ class Lack(Enum):
     """All that could make it true needs it first."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cause:
     """One root of what cannot be reached."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TypeAlias
 
@@ -14,6 +13,7 @@ from nondum.planning.merge.goal import GoalExpr, goal_text
 from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.normal import condition_of, joined
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import AlreadyTrue, Answer, GaveUp, GroundTask, Plan, Unsolvable
 
 Search: TypeAlias = Callable[[GroundTask], Answer]
@@ -23,7 +23,7 @@ _PARTS_LIMIT = 8
 """Of a goal with more parts, these are looked at."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Conflict:
     """What keeps a goal from being reached although nothing is missing for any part of it."""
 

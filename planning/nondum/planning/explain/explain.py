@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from nondum.planning.explain.cause import Cause, Lack
 from nondum.planning.explain.conflict import Conflict, Search, conflict_of
@@ -23,9 +22,10 @@ from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.syntax import Atom
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Diagnosis:
     """Why there is no plan."""
 

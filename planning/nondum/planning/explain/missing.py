@@ -22,6 +22,7 @@ from nondum.planning.pddl.syntax import (
     terms_of,
 )
 from nondum.planning.pddl.typegraph import types_or_root
+from nondum.sdk.frozen import frozen
 
 _PARTIAL_BINDINGS_LIMIT = 2000
 """How many are tried for one condition; beyond it the best ones so far are told."""
@@ -34,7 +35,7 @@ Missing = tuple[Formula, ...]
 """Literals, their variables replaced where they are bound; an `exists` of which there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Outlook:
     """What can become true, and what can never become false."""
 

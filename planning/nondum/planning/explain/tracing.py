@@ -30,12 +30,13 @@ from nondum.planning.pddl.syntax import (
     type_text,
 )
 from nondum.planning.pddl.typegraph import types_or_root
+from nondum.sdk.frozen import frozen
 
 _NEEDS_LIMIT = 2000
 """Conditions that are looked at, at most; chains beyond them are not found."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Need:
     """Facts of which one is wanted, and none can be reached."""
 
@@ -49,7 +50,7 @@ class Need:
         return fact(self.predicate, *self.terms)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Giver:
     """An action, one of its conditional changes, or a rule, and one atom that it makes true."""
 
@@ -71,7 +72,7 @@ class _Node:
     users: set[Need] = field(default_factory=set)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Way:
     """All that one giver lacks: what is missing for good, and what is needed first."""
 

@@ -26,6 +26,7 @@ from nondum.planning.pddl.syntax import (
     TypedName,
     renamed,
 )
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import Rule
 
 DISJUNCTS_LIMIT = 12
@@ -34,14 +35,14 @@ _WORK_OF_BINDING = 10
 """What writing out one binding of a quantifier counts as."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Both:
     """All parts hold; none: it is true."""
 
     parts: tuple[Tree, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Either:
     """Some part holds; none: it is false."""
 

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from nondum.planning.merge.domain import Action, DerivedRule
 from nondum.planning.pddl.normal import Condition
+from nondum.sdk.frozen import frozen
 
 Row: TypeAlias = tuple[str, ...]
 """The arguments of a fact."""
@@ -81,7 +82,7 @@ class Instance:
         return dict(zip(parameters, self.row, strict=True))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Derivation:
     """A rule with its variables bound, in numbers of facts."""
 
@@ -92,7 +93,7 @@ class Derivation:
     """Those of the condition."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Exploration:
     """The delete-relaxed reachable part of a domain."""
 

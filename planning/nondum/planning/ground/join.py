@@ -17,6 +17,7 @@ from typing import TypeAlias
 
 from nondum.planning.ground.instances import Row
 from nondum.planning.ground.matching import Pattern
+from nondum.sdk.frozen import frozen
 
 _FEW = 32
 """Up to this number, objects are looked up one by one rather than found among all rows."""
@@ -73,7 +74,7 @@ class Work:
             raise TooMuchWork
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Query:
     """What a join needs to know."""
 
@@ -92,7 +93,7 @@ class Query:
         return tuple(sorted(named))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Check:
     """Two values that must be the same, or must not."""
 
@@ -101,7 +102,7 @@ class _Check:
     is_equal: bool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Step:
     """One loop of a join: over the rows of a table, or over a variable's objects."""
 
@@ -120,7 +121,7 @@ class _Step:
     """Where one value alone is open: the values of a row, so that its few objects can be tried."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Run:
     """What a join is run with."""
 

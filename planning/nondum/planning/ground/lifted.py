@@ -18,12 +18,13 @@ from nondum.planning.merge.domain import Action, Merged
 from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.normal import Condition, condition_of, normal
 from nondum.planning.pddl.syntax import And, Atom, Equal, Formula, Not, Or, Quantified, TypedName
+from nondum.sdk.frozen import frozen
 
 State = frozenset[tuple[str, Row]]
 """The facts that hold, those that rules derive left out."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Situation:
     """A state in which conditions can be asked for. Make it with `Meaning.situation`."""
 

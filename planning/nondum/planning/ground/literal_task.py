@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from nondum.planning.ground.bounds import INSTANCES_LIMIT, Spending, work_for
 from nondum.planning.ground.delete_relaxation import reachable_part
@@ -14,13 +13,14 @@ from nondum.planning.merge.domain import Merged, bind
 from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.facts import parts
 from nondum.planning.pddl.syntax import Atom, Equal
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import ConditionalEffect, GroundAction, Layer, Rule
 
 GOAL = "goal"
 """What stands for a goal that is a disjunction."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LiteralTask:
     """A task like a ground task, but for what must be false: where a condition of it has `~number`,
     the fact of that number must not hold. Its layers have no complements."""

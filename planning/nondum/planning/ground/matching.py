@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from nondum.planning.ground.instances import Row
 from nondum.planning.pddl.syntax import Atom
+from nondum.sdk.frozen import frozen
 
 Binding: TypeAlias = dict[str, str]
 
@@ -40,7 +41,7 @@ class FactIndex:
         return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pattern:
     """A condition `(predicate term …)`; terms with `?` are variables."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from nondum.planning.ground.bounds import TooManyBindings
@@ -11,11 +10,12 @@ from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.domain import Merged
 from nondum.planning.merge.merge import merge
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Fitted(Generic[_T]):
     """What could be made of a domain once it was small enough."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 from nondum.planning.ground.instances import Row
@@ -13,6 +13,7 @@ from nondum.planning.merge.goal import GoalExpr
 from nondum.planning.pddl.facts import predicate_of
 from nondum.planning.pddl.normal import Condition, atoms_in, quantified_in
 from nondum.planning.pddl.syntax import Atom, Term
+from nondum.sdk.frozen import frozen
 
 Wish: TypeAlias = tuple[str, bool, tuple[str, ...]]
 """A predicate, whether the fact is to be true, and its arguments; empty: whatever it is."""
@@ -22,7 +23,7 @@ _MOST = 16
 """Patterns of one predicate, at most; beyond them all its facts are asked for."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RelevantPart:
     """The part of a domain that a goal depends on."""
 

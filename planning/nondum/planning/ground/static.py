@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 
 from nondum.planning.ground.instances import Row
@@ -20,6 +19,7 @@ from nondum.planning.pddl.syntax import (
     Quantified,
     Term,
 )
+from nondum.sdk.frozen import frozen
 
 _WORK_OF_BINDING = 3
 """What looking at one binding of a quantifier counts as."""
@@ -27,7 +27,7 @@ Names = Mapping[str, str]
 """Variable → object."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StaticFacts:
     """The facts that no action and no rule writes."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 from nondum.planning.merge.contribution import Contribution
@@ -34,9 +33,10 @@ from nondum.planning.pddl.syntax import (
 from nondum.planning.pddl.typegraph import types_or_root
 from nondum.sdk.description import Behaviour
 from nondum.sdk.errors import FragmentRefused, Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Claims:
     """One component's fragments, names resolved. With problems, the rest is empty."""
 

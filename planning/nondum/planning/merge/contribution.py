@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 
 from nondum.planning.pddl.facts import fact
@@ -15,6 +14,7 @@ from nondum.sdk.description import (
     PluginDescription,
     Unit,
 )
+from nondum.sdk.frozen import frozen
 
 
 def object_name(host: str, component: str, local: str) -> str:
@@ -38,7 +38,7 @@ def id_at_home(component: str) -> str:
     return component.partition("@")[0]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class UnitObject:
     """A unit as an object of planning."""
 
@@ -48,7 +48,7 @@ class UnitObject:
     type: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StreamObject:
     """An output slot as an object of planning."""
 
@@ -60,7 +60,7 @@ class StreamObject:
     """The object of the unit that it belongs to."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Contribution:
     """One component's part in planning. Equal contributions merge equally, whenever they came."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from nondum.planning.merge.domain import DerivedRule
 from nondum.planning.merge.scope import Scope
@@ -11,9 +10,10 @@ from nondum.planning.pddl.caret import Misplaced
 from nondum.planning.pddl.normal import atoms_in, condition_of
 from nondum.planning.pddl.syntax import DerivedDeclaration, DomainFragment, TypedName
 from nondum.planning.pddl.typegraph import types_or_root
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Strata:
     """Derived predicates in groups, each after those that it asks the negation of."""
 

@@ -11,6 +11,7 @@ from nondum.planning.pddl.normal import Condition
 from nondum.planning.pddl.syntax import Atom, Place, PredicateDeclaration, TypedName
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundAction
 
 
@@ -28,7 +29,7 @@ class Origin:
         return " ".join(filter(None, (self.plugin, self.version, str(self.place or ""))))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Predicate:
     """A predicate and what may stand at each position (several types mean `either`)."""
 
@@ -62,7 +63,7 @@ class Predicate:
         return len(self.parameters)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Object:
     """Something that exists."""
 
@@ -77,7 +78,7 @@ class Object:
     origins: tuple[Origin, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Action:
     """An action schema: one for all instances of a plugin."""
 
@@ -104,7 +105,7 @@ class Action:
         return tuple(parameter.name.removeprefix("?") for parameter in self.parameters)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DerivedRule:
     """`head` holds for every binding of its parameters for which the condition does."""
 
@@ -114,7 +115,7 @@ class DerivedRule:
     origins: tuple[Origin, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Domain:
     """The words and actions known now."""
 
@@ -127,7 +128,7 @@ class Domain:
     """Functions of objects to numbers, which costs are added up from."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Merged:
     """All contributions as one: what `merge` gives."""
 

@@ -21,9 +21,10 @@ from nondum.planning.pddl.syntax import (
     When,
     renamed,
 )
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConditionalChange:
     """Changes for every binding of `variables` for which the condition holds."""
 
@@ -37,7 +38,7 @@ class ConditionalChange:
         return self.add + self.delete
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Effect:
     """What changes, and what it costs."""
 
@@ -84,7 +85,7 @@ def effect_of(formula: Formula, parameters: Iterable[str] = (), *, unnamed_cost:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Where:
     """For which bindings, and under which condition."""
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from typing import TypeAlias
 
 from nondum.sdk.description import Behaviour, Fragment, PluginDescription
+from nondum.sdk.frozen import frozen
 
 MARK = "--"
 """Before the payload's id. No manifest's id of a component, or distribution, has two hyphens."""
@@ -25,7 +26,7 @@ Words: TypeAlias = tuple[tuple[Fragment, ...], tuple[Behaviour, ...]]
 """What a plugin means by its name: planning reads its actions from these."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GivenNames:
     """What a host calls what one payload brings."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
@@ -14,6 +13,7 @@ from nondum.planning.pddl.caret import Misplaced
 from nondum.planning.pddl.normal import Condition, condition_of
 from nondum.planning.pddl.parse import parse_formula
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 GoalExpr: TypeAlias = Condition
 """Facts that must hold, must not hold, and objects that must be equal or not; no variables."""
@@ -26,7 +26,7 @@ FILE = "goal"
 """Where problems with a goal's text are said to be."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Goal:
     """A condition to make true, once or for as long as it is wanted."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from nondum.planning.merge.contribution import Contribution, StreamObject, UnitObject
 from nondum.planning.merge.domain import Origin, bind
@@ -22,9 +21,10 @@ from nondum.planning.pddl.syntax import (
 )
 from nondum.planning.pddl.typegraph import ROOT, TypeGraph, types_or_root
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ObjectClaim:
     """A shared object and the types claimed for it."""
 
@@ -33,7 +33,7 @@ class ObjectClaim:
     origin: Origin
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ValueClaim:
     """A number given to a function of objects."""
 
@@ -43,7 +43,7 @@ class ValueClaim:
     origin: Origin
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FactClaim:
     """A fact of a problem fragment."""
 

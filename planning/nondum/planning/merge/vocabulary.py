@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.planning.merge.core import core_graph, core_predicates
 from nondum.planning.merge.domain import Origin, Predicate
@@ -17,13 +17,14 @@ from nondum.planning.pddl.syntax import (
     type_text,
 )
 from nondum.planning.pddl.typegraph import ROOT, TypeGraph
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import MESSAGES
 
 TYPES_LIMIT = 500
 """Types that one component may declare."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TypeClaim:
     """A type and the parents claimed for it; none: no claim."""
 

@@ -7,7 +7,6 @@ written, since a grammar with one token of lookahead cannot group it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from lark import Token, Transformer
@@ -33,9 +32,10 @@ from nondum.planning.pddl.syntax import (
     TypedName,
     When,
 )
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _OfType:
     """`- type`, closing a run of names."""
 
@@ -43,7 +43,7 @@ class _OfType:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Section:
     """One section of a domain, problem or action."""
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nondum.planning.pddl.normal import Condition, condition_of, joined
 from nondum.planning.pddl.syntax import Atom, Equal, Or, Quantified, TypedName, renamed
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Flat:
     """A conjunction in which what must merely exist has become a variable like others."""
 

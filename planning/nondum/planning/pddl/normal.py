@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from nondum.planning.pddl.caret import Misplaced
 from nondum.planning.pddl.syntax import (
@@ -19,9 +18,10 @@ from nondum.planning.pddl.syntax import (
     When,
     renamed,
 )
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Condition:
     """A conjunction: all of these hold."""
 

@@ -7,11 +7,13 @@ they say the same; where they were written does not count.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
+from nondum.sdk.frozen import frozen
 
-@dataclass(frozen=True, slots=True)
+
+@frozen
 class Place:
     """Where something is written."""
 
@@ -25,7 +27,7 @@ class Place:
         return f"{self.file}:{self.line}:{self.column}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Term:
     """A variable (`?x`) or the name of an object."""
 
@@ -41,7 +43,7 @@ class Term:
         return self.name
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TypedName:
     """A name that is declared, with the types claimed for it; several of them mean `either`."""
 
@@ -63,7 +65,7 @@ def type_text(types: tuple[str, ...]) -> str:
     return types[0] if len(types) == 1 else f"(either {' '.join(types)})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Atom:
     """`(predicate term …)`."""
 
@@ -75,7 +77,7 @@ class Atom:
         return f"({' '.join((self.predicate, *(term.name for term in self.terms)))})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Equal:
     """`(= left right)` between terms."""
 
@@ -87,7 +89,7 @@ class Equal:
         return f"(= {self.left} {self.right})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Not:
     """`(not part)`."""
 
@@ -98,7 +100,7 @@ class Not:
         return f"(not {self.part})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class And:
     """`(and part …)`; without parts it is true, and changes nothing."""
 
@@ -109,7 +111,7 @@ class And:
         return f"(and{''.join(f' {part}' for part in self.parts)})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Or:
     """`(or part …)`; without parts it is false."""
 
@@ -120,7 +122,7 @@ class Or:
         return f"(or{''.join(f' {part}' for part in self.parts)})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Imply:
     """`(imply condition part)`."""
 
@@ -132,7 +134,7 @@ class Imply:
         return f"(imply {self.condition} {self.part})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Quantified:
     """`(forall (variables) part)` or `(exists (variables) part)`."""
 
@@ -146,7 +148,7 @@ class Quantified:
         return f"({self.quantifier} ({' '.join(map(str, self.variables))}) {self.part})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class When:
     """`(when condition effect)`."""
 
@@ -158,7 +160,7 @@ class When:
         return f"(when {self.condition} {self.effect})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Numeric:
     """A comparison or change of numbers: `(increase (total-cost) 3)`, `(>= (fuel ?u) 1)`."""
 
@@ -253,7 +255,7 @@ def _value(value: Atom | Term | float, names: Mapping[str, str]) -> Atom | Term 
             return value
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PredicateDeclaration:
     """`(predicate ?parameter - type …)`, also used for functions."""
 
@@ -265,7 +267,7 @@ class PredicateDeclaration:
         return f"({' '.join((self.name, *map(str, self.parameters)))})"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ActionDeclaration:
     """`(:action name :parameters … :precondition … :effect …)`."""
 
@@ -276,7 +278,7 @@ class ActionDeclaration:
     place: Place = field(compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DerivedDeclaration:
     """`(:derived (predicate ?x - type …) condition)`: holds wherever the condition does."""
 
@@ -292,7 +294,7 @@ class DerivedDeclaration:
         return Atom(self.name, terms, self.place)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DomainFragment:
     """What one `(define (domain …) …)` says."""
 
@@ -312,7 +314,7 @@ class DomainFragment:
     actions: tuple[ActionDeclaration, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProblemFragment:
     """What one `(define (problem …) …)` says."""
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
+
+from nondum.sdk.frozen import frozen
 
 Clause: TypeAlias = tuple[int, int, int]
 """Mask, value, head: the head is added to a state whose bits under the mask have the value."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Stage:
     """Clauses that are looked at one after the other, again and again where they are cyclic."""
 
@@ -28,7 +29,7 @@ class Stage:
                 return state
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MaskLayer:
     """A layer as masks: rules (head, body), and complements (fact, other)."""
 

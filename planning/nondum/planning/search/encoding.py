@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from nondum.planning.search.derivation import MaskLayer, Stage, stages_of
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundAction, GroundTask
 
 State: TypeAlias = int
 """A settled state: the bits of the facts that hold, derived ones included. Bit 0 always holds."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class When:
     """A conditional effect; its condition leaves out what the action requires anyway."""
 
@@ -22,7 +22,7 @@ class When:
     delete: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Move:
     """An action as masks."""
 
@@ -38,7 +38,7 @@ class Move:
     conditional: tuple[When, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Encoded:
     """What the searches work on."""
 

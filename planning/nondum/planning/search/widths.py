@@ -6,7 +6,6 @@ Source: Lipovetzky and Geffner 2017, BFWS(f5), with landmarks in place of goals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from heapq import heappop, heappush
 
 from nondum.planning.search.encoding import Encoded, State
@@ -14,12 +13,13 @@ from nondum.planning.search.landmarks import Landmarks
 from nondum.planning.search.relaxation import Relaxation
 from nondum.planning.search.successors import Successors
 from nondum.planning.search.tree import Moves, SearchState, Tree
+from nondum.sdk.frozen import frozen
 
 _PER_STATE = 60
 """Work of making a state and looking whether it is new, in terms of `Relaxation.effort`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Way:
     """How far a state has come."""
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
+
+from nondum.sdk.frozen import frozen
 
 FREE_WORDS = "text"
 """The slot type that takes any words, and binds nothing."""
@@ -19,14 +20,14 @@ class PatternInvalid(ValueError):
     """A pattern that cannot be read; the message says why."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Word:
     """A word that must be said."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Slot:
     """A place for words that name something."""
 
@@ -40,7 +41,7 @@ class Slot:
         return self.types == (FREE_WORDS,)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Optional:
     """A part that may be left out."""
 

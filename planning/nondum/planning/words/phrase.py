@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import cast, get_args
 
 from nondum.planning.merge.contribution import Contribution
@@ -22,13 +21,14 @@ from nondum.planning.words.pattern import (
 )
 from nondum.sdk.description import Phrase
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 MAX_SLOTS = 3
 MAX_OPTIONAL_PARTS = 4
 """Both bound the ways to read a sentence."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KnownPhrase:
     """A pattern and what it asks for."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 
@@ -14,6 +13,7 @@ from nondum.planning.merge.scope import SELF
 from nondum.planning.words.pattern import Part, Said, Slot, Word, matches, name_words, words_of
 from nondum.planning.words.phrase import KnownPhrase, known_phrases
 from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 
 MAX_WORDS = 40
 """A longer sentence is not looked at."""
@@ -23,7 +23,7 @@ MAX_OFFERS = 200
 _Names = Mapping[tuple[str, ...], frozenset[str]]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reading:
     """What a sentence means by one phrase."""
 
@@ -41,7 +41,7 @@ class Reading:
         return f'{self.goal}, by "{self.phrase.pattern}" of {self.phrase.plugin}'
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Phrasebook:
     """What people can say now. Make it with `phrasebook`, again after each merge."""
 

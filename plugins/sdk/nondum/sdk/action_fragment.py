@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from nondum.sdk.description import Fragment
 from nondum.sdk.errors import Problem, WorkerFailed
@@ -24,6 +24,7 @@ from nondum.sdk.formula import (
     read,
     uses,
 )
+from nondum.sdk.frozen import frozen
 from nondum.sdk.signature import ActionSignature, Parameter
 
 NAME = "generated.pddl"
@@ -51,7 +52,7 @@ _HOST = re.compile(r"\?h(?![\w-])")
 _QUANTIFIED_HOST = re.compile(r"(?:forall|exists)\s*\([^()]*\?h(?![\w-])")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StatedEffect:
     """What `@behaviour` says of its action, in PDDL."""
 
@@ -61,7 +62,7 @@ class StatedEffect:
     """What the precondition has beyond what it always has."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StatedAction:
     """An action that no fragment declares."""
 
@@ -117,7 +118,7 @@ def generated_fragments(
     return (Fragment(NAME, "\n  ".join(lines) + ")\n"),)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Words:
     """The words that a plugin has: the core's, those of its fragments, and those generated."""
 

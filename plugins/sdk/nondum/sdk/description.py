@@ -8,13 +8,14 @@ inverse to each other.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import resources
 from typing import Any, cast
 
 from nondum.sdk.codec.checks import Mismatch
 from nondum.sdk.codec.values import OMIT_DEFAULT, from_plain, to_plain
 from nondum.sdk.errors import Problem, WorkerFailed
+from nondum.sdk.frozen import frozen
 
 ACTUATORS = frozenset({"base", "pointer", "arm", "gripper"})
 """Unit types that move the body: one user at a time, whatever their plugin says."""
@@ -30,7 +31,7 @@ _ADDED = OMIT_DEFAULT
 know, so such a key is written only where an author has said something in it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Fragment:
     """A piece of PDDL, a domain or a problem, that a component contributes.
 
@@ -49,7 +50,7 @@ class Fragment:
         return cls(name=name, text=text)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Output:
     """An output slot of a unit: one stream object in planning."""
 
@@ -63,7 +64,7 @@ class Output:
     odometry that a camera works out."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Input:
     """An optional input of a unit, wired by the host to a flowing stream on the same body that has
     its type and is of what it asks for. (Required inputs are the stream parameters of actions.)"""
@@ -75,7 +76,7 @@ class Input:
     Empty: of anything; then a stream that only has the type may be the wrong one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unit:
     """What a component brings to act with: the actor of its actions."""
 
@@ -88,7 +89,7 @@ class Unit:
     """How many behaviours it serves at once; 0: no limit. Actuators always serve one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Behaviour:
     """Something that a plugin can do, startable and haltable."""
 
@@ -103,7 +104,7 @@ class Behaviour:
     """What becomes of it when another host asked for it and is lost: one of `WHEN_LOST`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Condition:
     """Something that a plugin can tell about the world: it keeps predicates true or false."""
 
@@ -112,7 +113,7 @@ class Condition:
     doc: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Phrase:
     """A pattern of words and the goal that it asks for."""
 
@@ -124,7 +125,7 @@ class Phrase:
     """`achieve`, `maintain`, or `do`: achieve it again each time, as the answer to a question."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Label:
     """A name in words for an object or class: `("radiation-source", "the radiation source")`."""
 
@@ -132,7 +133,7 @@ class Label:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceNeed:
     """A device that a plugin opens, matched on udev properties."""
 
@@ -142,7 +143,7 @@ class DeviceNeed:
     optional: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PluginDescription:
     """All that a plugin says about itself."""
 

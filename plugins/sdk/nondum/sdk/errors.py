@@ -31,14 +31,15 @@ A mistake in calling code stays `TypeError` or `ValueError`; these say that the 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import cast
 
 from nondum.sdk import codes
 from nondum.sdk.codec.values import OMIT_DEFAULT, to_plain
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Problem:
     """One thing that is wrong, in the same words wherever it is shown."""
 

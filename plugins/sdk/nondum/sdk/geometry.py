@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import singledispatchmethod
 from typing import Any, TypeVar
 
 from nondum.sdk.errors import FrameUnknown, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import Bearing, Message, Pose, Quaternion, Twist, Vector
 
 IDENTITY_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 _Geometric = TypeVar("_Geometric", bound=Message)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Transform:
     """The pose of a child frame in its parent: takes what is in the child's axes to the parent."""
 

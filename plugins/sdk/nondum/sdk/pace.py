@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from nondum.sdk.frozen import frozen
 
 STALL_S = 1.0
 """Nothing is overdue sooner."""
@@ -15,7 +15,7 @@ _KEPT = 0.8
 """What counts of the longest period when one comes sooner."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pace:
     """The pace of what has come so far.
 

@@ -7,8 +7,9 @@ overruns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar, Protocol, TypeAlias, runtime_checkable
+
+from nondum.sdk.frozen import frozen
 
 CONDITIONAL_EFFECTS = "conditional-effects"
 """A feature that a planner may handle: actions with effects under conditions."""
@@ -16,7 +17,7 @@ DERIVED_PREDICATES = "derived-predicates"
 """A feature that a planner may handle: facts that follow from others by rules."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConditionalEffect:
     """Changes that an action makes only where a condition holds when it is applied."""
 
@@ -25,7 +26,7 @@ class ConditionalEffect:
     delete: frozenset[int]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GroundAction:
     """An action with all its parameters bound. Facts are indices into `GroundTask.facts`.
 
@@ -52,7 +53,7 @@ class GroundAction:
         return tuple(self.name.split(" ")[1:])
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rule:
     """A derived fact that holds wherever all of `body` does."""
 
@@ -60,7 +61,7 @@ class Rule:
     body: frozenset[int]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Layer:
     """Derived facts that depend on each other; earlier layers are settled before it.
 
@@ -73,7 +74,7 @@ class Layer:
     complements: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GroundTask:
     """A STRIPS task: positive facts only; a relevant negated fact has a complementary fact."""
 
@@ -93,7 +94,7 @@ class GroundTask:
         return frozenset(conditional | ({DERIVED_PREDICATES} if self.derived else set()))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PddlTask:
     """The same task in words, for planners that ground by themselves."""
 
@@ -101,7 +102,7 @@ class PddlTask:
     problem: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plan:
     """Indices into `GroundTask.actions`, in order."""
 
@@ -109,19 +110,19 @@ class Plan:
     cost: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlanText:
     """A plan as a planner of `PddlTask` gives it: `action obj obj …` for each step."""
 
     steps: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class AlreadyTrue:
     """The goal holds in the initial state."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unsolvable:
     """There is no plan, and this is why: never said without a proof."""
 
@@ -131,7 +132,7 @@ class Unsolvable:
     """The goal facts that cannot be reached, where the proof names them."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GaveUp:
     """No answer: not the same as impossible."""
 

@@ -11,7 +11,7 @@ import inspect
 import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -29,6 +29,7 @@ from nondum.sdk.description import (
     Unit,
 )
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
+from nondum.sdk.frozen import frozen
 from nondum.sdk.raised import within_packages
 from nondum.sdk.signature import parse_signature
 from nondum.sdk.ticked import TickedBehaviour
@@ -40,7 +41,7 @@ _NOT_THERE = (
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Plugin:
     """A loaded plugin; nothing of it has run but its import."""
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import keyword
 import re
-from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem, WorkerFailed
+from nondum.sdk.frozen import frozen
 
 _NAME = re.compile(r"[a-z][a-z0-9_-]*")
 _TOKEN = re.compile(r"\?[^\s()]+|[()]|[^\s()?]+")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Parameter:
     """One parameter of an action."""
 
@@ -28,7 +28,7 @@ class Parameter:
         return f"{name}_" if keyword.iskeyword(name) else name
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ActionSignature:
     """An action's name and typed parameters; the first is the actor."""
 

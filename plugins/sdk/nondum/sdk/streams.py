@@ -21,10 +21,10 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import Buffer, Message, message_from_wire
 from nondum.sdk.packets import Handle, Packets, discard
 from nondum.sdk.slots import MAX_SLOT_BYTES, MappedSlots, Slot, SlotRing
@@ -44,7 +44,7 @@ UNLIMITED = 2**31
 _INLINE, _IN_SLOT, _RETIRED = range(3)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Frame:
     """A message, ready for any number of consumers."""
 
@@ -210,7 +210,7 @@ class _Outlet:
             self._on_closed()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Waiting:
     """A message that has arrived and was not taken yet."""
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, get_args
 
 import msgpack
 
 from nondum.sdk.codec.checks import Bounds
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.packet_codec import PacketCodec
 from nondum.sdk.wire_fields import Name, Number
 
@@ -31,7 +31,7 @@ MAX_ITEMS = 10_000
 Body: TypeAlias = Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Hello:
     """The worker's first packet."""
 
@@ -42,7 +42,7 @@ class Hello:
     pid: Number
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Welcome:
     """The host's answer: the version to speak, and what the worker needs to know of its place."""
 
@@ -50,7 +50,7 @@ class Welcome:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Request:
     """Asks the other end to do something; answered by one Reply or Failure of the same id."""
 
@@ -59,7 +59,7 @@ class Request:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reply:
     """A request was carried out."""
 
@@ -67,7 +67,7 @@ class Reply:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Failure:
     """A request failed, or was halted (code HALTED)."""
 
@@ -75,7 +75,7 @@ class Failure:
     problems: Annotated[tuple[Problem, ...], Bounds(1, MAX_ITEMS)]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Event:
     """Something happened; not answered."""
 
@@ -85,7 +85,7 @@ class Event:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cancel:
     """Halt a request; the answer still comes."""
 

@@ -6,12 +6,13 @@ One per worker. Contexts read it; the session changes it as the host tells. All 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.geometry import FrameTree
 from nondum.sdk.messages import Message, value_from_wire
 from nondum.sdk.ports import InputPort, OutputPort
@@ -23,7 +24,7 @@ MOST_FAULTS = 100
 Tell = Callable[[str, Mapping[str, Any], int | None], None]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceNode:
     """One node of a device: a camera may have two, a sound card has several."""
 
@@ -38,7 +39,7 @@ class DeviceNode:
         return self.properties.get("SUBSYSTEM", "")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Device:
     """A device that the host has granted."""
 
@@ -57,7 +58,7 @@ class Device:
         return cls(body["node"], dict(body.get("properties", {})), every)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Place:
     """Who and where a worker is: the host's welcome."""
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ipaddress
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.identity import Security, is_loopback
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.messages import VERSIONS
@@ -13,7 +13,7 @@ DEVELOPMENT = "development:"
 """What the key of a host without keys begins with."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Announcement:
     """One host, for as long as nothing of this changes."""
 

@@ -10,10 +10,10 @@ import secrets
 import socket
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.sdk.errors import ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.transport.discovery import packets, udp
 from nondum.transport.discovery.interfaces import (
     Flags,
@@ -38,7 +38,7 @@ class Result(Enum):
     """Hosts are not found."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Finding:
     """One thing that was looked at."""
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import ipaddress
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import MAX_ID
 from nondum.transport.discovery.announcement import DEVELOPMENT, Announcement, security_of
 from nondum.transport.peers.identity import Security
@@ -37,7 +37,7 @@ class Source(Enum):
     """The host at an address from `peers.static` said it."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Hint:
     """A peer may be there."""
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.discovery.announcement import DEVELOPMENT
 from nondum.transport.discovery.hint import MAX_ADDRESSES, Hint, Source
 from nondum.transport.link.token_bucket import TokenBucket
@@ -21,7 +22,7 @@ NEW_PEERS_PER_S = 32.0
 """How fast unknown peers may come up, after a burst of `MAX_PEERS`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ReceivedHint:
     """One hint, and when it was received."""
 
@@ -29,7 +30,7 @@ class ReceivedHint:
     at_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Change:
     """What a hint has changed."""
 

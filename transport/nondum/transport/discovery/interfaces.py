@@ -11,12 +11,13 @@ import re
 import socket
 import struct
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import IntFlag
 from pathlib import Path
 from typing import TypeAlias
 
 import ifaddr
+
+from nondum.sdk.frozen import frozen
 
 IPInterface: TypeAlias = ipaddress.IPv4Interface | ipaddress.IPv6Interface
 """An address with its network."""
@@ -39,7 +40,7 @@ class Flags(IntFlag):
     MULTICAST = 0x1000
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Interface:
     """One interface, at one moment."""
 

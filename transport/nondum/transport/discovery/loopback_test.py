@@ -6,15 +6,15 @@ import secrets
 import socket
 import struct
 import time
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.discovery.hint import SERVICE
 
 PORT = 5353
 PATIENCE_S = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LoopbackTest:
     """A multicast group, on one interface."""
 

@@ -7,11 +7,11 @@ to the length of the longest answer, so that hosts cannot be used to amplify tra
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import msgpack
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import MAX_NAME
 from nondum.transport.discovery.announcement import Announcement
 from nondum.transport.discovery.hint import to_txt
@@ -24,7 +24,7 @@ _QUESTION = b"nondum?1"
 _ANSWER = b"nondum!1"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Answer:
     """What a host answers, as it was received: `hint.from_txt` judges the fields."""
 

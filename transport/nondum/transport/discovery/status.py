@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InterfaceRow:
     """One interface. Times are on the loop's clock."""
 
@@ -26,7 +26,7 @@ class InterfaceRow:
     problem: Problem | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StaticRow:
     """One host that the integrator has given. Times are on the loop's clock."""
 
@@ -39,7 +39,7 @@ class StaticRow:
     problem: Problem | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DiscoveryStatus:
     """All of it, at one moment."""
 

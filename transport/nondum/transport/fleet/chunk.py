@@ -7,11 +7,11 @@ and packing is done once, however many peers there are.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Any, TypeAlias
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire import Body, unpack
 from nondum.sdk.wire_fields import Number, read_field
 from nondum.transport.peers.messages import MAX_MESSAGE
@@ -34,7 +34,7 @@ Packed: TypeAlias = Mapping[str, bytes | None]
 """Changes: packed entries by key, None for one that is gone."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Chunk:
     """One of `parts` messages that lead from one revision of a catalogue to another."""
 

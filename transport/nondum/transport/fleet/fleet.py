@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire import Body
 from nondum.transport.peers.calls import Call
 from nondum.transport.peers.events import PeerEvent
@@ -19,7 +19,7 @@ OWN_METHODS = "fleet."
 """Calls and notices that begin so are the fleet's own: no handler ever sees one."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Peer:
     """A host that can be called, and what it tells about itself."""
 
@@ -37,7 +37,7 @@ class Peer:
     """The last ping's time there and back; None before one was answered."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerChanged:
     """A peer's catalogue is another one."""
 

@@ -6,15 +6,16 @@ Chunks may come twice, late, out of order or not at all: what they cannot bring 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire import Body
 from nondum.transport.fleet.chunk import MAX_CATALOGUE, Chunk, Packed, digest_of, read_entry, size
 from nondum.transport.peers.pulse import DIGEST_BYTES, State
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Change:
     """What chunks have brought."""
 
@@ -22,7 +23,7 @@ class Change:
     is_whole: bool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Copy:
     """The catalogue at one revision, with what each entry adds to its digest and its size."""
 

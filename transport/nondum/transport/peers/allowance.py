@@ -8,9 +8,9 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.link.token_bucket import TokenBucket
 
 LENGTH = 16 * 1024
@@ -27,7 +27,7 @@ BARRED_S = 30.0
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Allowance:
     """Messages that no call of this host has asked for. Answers to calls are free."""
 

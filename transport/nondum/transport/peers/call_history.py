@@ -7,8 +7,9 @@ link broke. So a number above the highest one seen is new, and every other was s
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
 from enum import Enum
+
+from nondum.sdk.frozen import frozen
 
 
 class Seen(Enum):
@@ -22,7 +23,7 @@ class Seen(Enum):
     """It was carried out, or begun, but its answer is kept no more."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bounds:
     """How much is kept of answers that the caller has not settled."""
 

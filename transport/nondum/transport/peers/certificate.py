@@ -17,11 +17,12 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Container
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import NewType
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.ed25519 import SigningKey, is_signed
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, parse_key
@@ -40,7 +41,7 @@ _FIELDS = ("fleet", "host", "key", "not-before", "not-after", "signature")
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Certificate:
     """The fleet says: this key is this host's, from then until then."""
 

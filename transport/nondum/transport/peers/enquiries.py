@@ -7,8 +7,9 @@ peer of the host that it asks, together with everybody else that asks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers.keys import PeerKey
 
@@ -21,7 +22,7 @@ ASKS_PER_S, ASKS = 20.0, 200.0
 """What one peer may ask; more is not answered."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Enquiry:
     """One ping, and who waits for its answer."""
 

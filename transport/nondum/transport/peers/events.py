@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.refusals import Refusal
 
@@ -26,7 +26,7 @@ class Loss(Enum):
     CLOSED = "this host has closed its links"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerUp:
     """A peer can be called."""
 
@@ -37,7 +37,7 @@ class PeerUp:
     admitted_by: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerLost:
     """A peer cannot be called any more; calls to it have failed."""
 
@@ -46,7 +46,7 @@ class PeerLost:
     reason: Loss
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DialFailed:
     """An address did not lead to the peer; told again only when the reason changes."""
 
@@ -55,7 +55,7 @@ class DialFailed:
     problem: Problem
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LinksFailed:
     """All links broke at once, for a fault of this host's; they come back by themselves."""
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ipaddress
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 
@@ -21,7 +21,7 @@ class Security(Enum):
     DEVELOPMENT = "development: no keys, this machine only"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Identity:
     """A host."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import NewType
 
@@ -16,6 +16,7 @@ import zmq
 from zmq.utils import z85
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import private_file
 from nondum.transport.peers.failures import PeerRefused
 
@@ -25,7 +26,7 @@ PeerKey = NewType("PeerKey", str)
 _HEADER = "nondum-host-key@1"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostKeys:
     """A key pair. The secret is not shown by `repr`."""
 

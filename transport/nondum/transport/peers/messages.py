@@ -8,11 +8,11 @@ a version, or part with a reason.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, TypeAlias, get_args
 
 from nondum.sdk.codec.checks import Bounds
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.packet_codec import FLAT, PacketCodec
 from nondum.sdk.wire import Body, pack, unpack
 from nondum.sdk.wire_fields import MAX_ID, Name, Number
@@ -25,7 +25,7 @@ MAX_MESSAGE = 128 * 1024
 MAX_CERTIFICATE = 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Hello:
     """The first message of the host that dialled, and, as `Welcome`, the answer to it."""
 
@@ -45,21 +45,21 @@ def _check_version(hello: Hello) -> None:
     Bounds(1, 1)(hello.versions)  # the one to speak
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Welcome:
     """The answer to a hello: the same of the other end, with the one version to speak."""
 
     hello: Annotated[Hello, FLAT, _check_version]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Refused:
     """The last message before a link is cut: why."""
 
     problem: Problem
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Request:
     """A call; answered once, by `Reply` or `Failure` with the same number."""
 
@@ -72,7 +72,7 @@ class Request:
     args: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Reply:
     """A call was carried out."""
 
@@ -80,7 +80,7 @@ class Reply:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Failure:
     """A call failed, or was halted."""
 
@@ -88,7 +88,7 @@ class Failure:
     problems: Annotated[tuple[Problem, ...], Bounds(1, 64)]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Progress:
     """How far a call is; may be lost."""
 
@@ -96,14 +96,14 @@ class Progress:
     body: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cancel:
     """Halt a call; it is still answered."""
 
     number: Number
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Notice:
     """Something worth knowing; not answered, and never repeated."""
 
@@ -111,7 +111,7 @@ class Notice:
     args: Body
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ping:
     """The sender's loop is working."""
 
@@ -122,21 +122,21 @@ class Ping:
     """How far the sender's account of itself is; two more fields, or none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pong:
     """A ping came; not every one is answered."""
 
     number: Number
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bye:
     """The sender is going, and means to."""
 
     reason: Name
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ask:
     """Whether a host answers that the sender does not hear (SWIM's ping-req)."""
 
@@ -145,7 +145,7 @@ class Ask:
     """Of the host in question."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Vouch:
     """The host that was asked about has answered the sender; nothing is said when it has not."""
 

@@ -6,10 +6,10 @@ import contextlib
 import itertools
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import zmq
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.drained import Drained
 
 _FORMAT = struct.Struct("=HI")
@@ -33,7 +33,7 @@ HANDSHAKE_FAILED = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SocketEvent:
     """Something happened to a connection."""
 

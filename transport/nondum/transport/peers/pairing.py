@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import hashlib
 import hmac
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum
 from typing import Annotated, TypeAlias
 
 from nondum.sdk.codec.checks import Bounds
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.certificate import HOST_NAME
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, parse_key
@@ -47,7 +48,7 @@ HostName: TypeAlias = Annotated[str, _check_name]
 Hash: TypeAlias = Annotated[bytes, Bounds(HASH_BYTES, HASH_BYTES)]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ask:
     """The first message: pair with me."""
 
@@ -55,7 +56,7 @@ class Ask:
     name: HostName
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Commit:
     """The answer: I hold a nonce of which this is the hash."""
 
@@ -64,14 +65,14 @@ class Commit:
     commitment: Hash
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Nonce:
     """A nonce, told."""
 
     nonce: Annotated[bytes, Bounds(NONCE_BYTES, NONCE_BYTES)]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Agreed:
     """The person here saw the same code there."""
 
@@ -102,7 +103,7 @@ class Role(Enum):
     ANSWERING = "answering"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pairing:
     """One try, seen from one end."""
 
@@ -139,7 +140,7 @@ class Pairing:
         return f"{digits[: CODE_DIGITS // 2]} {digits[CODE_DIGITS // 2 :]}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PairingWindow:
     """A person allowed pairing here, for a while and a few tries."""
 

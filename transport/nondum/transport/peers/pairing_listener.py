@@ -8,10 +8,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import zmq
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import tcp
 from nondum.transport.peers.arrivals import Arrivals
 from nondum.transport.peers.drained import Drained
@@ -29,7 +29,7 @@ MOST_SENT = 64 * 1024
 life of a whole window, each some 40 bytes, are nearly all of that."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Asker:
     """The sender of a message."""
 

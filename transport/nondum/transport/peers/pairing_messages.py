@@ -6,10 +6,10 @@ raises.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias, get_args
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.packet_codec import PacketCodec
 from nondum.sdk.wire import pack, unpack
 from nondum.transport.peers.pairing import Message
@@ -36,14 +36,14 @@ class Ending(Enum):
     """It was told what does not belong there, or nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ended:
     """The try is over for the end that says so."""
 
     why: Ending
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Beat:
     """Nothing: it is sent to learn whether the connection is still there."""
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.keys import PeerKey, fingerprint
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Idle:
     """No window was opened yet."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Waiting:
     """This host can be paired, and no code is known yet."""
 
@@ -23,7 +23,7 @@ class Waiting:
     """What became of the last try; before there was one, of the last address that was dialled."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Comparing:
     """A code is shown: the people must see the same one on the other host."""
 
@@ -40,7 +40,7 @@ class Comparing:
         return fingerprint(self.key)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Agreed:
     """Both people said yes: the host to trust."""
 
@@ -48,7 +48,7 @@ class Agreed:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Failed:
     """No host was paired, and the window is closed."""
 

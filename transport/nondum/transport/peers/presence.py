@@ -12,8 +12,8 @@ import asyncio
 import itertools
 import random
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.enquiries import Enquiries
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Link
@@ -31,7 +31,7 @@ FIRST_PROBE = 2**40 * ANSWERED
 """First number of the pings that ask for an answer: hosts answer multiples of `ANSWERED`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Asked:
     """A question that peers were asked."""
 

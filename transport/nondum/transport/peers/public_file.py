@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import base64
 import binascii
-from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.certificate import FleetKey, check_name
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import PeerKey, parse_key
@@ -21,7 +21,7 @@ MAX_BYTES = 512
 _HOST, _FLEET = "nondum-host@1", "nondum-fleet@1"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostPublic:
     """A host's key, and what it is called."""
 
@@ -33,7 +33,7 @@ class HostPublic:
         return f"{_HOST} {self.key} {self.name}\n"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FleetPublic:
     """A fleet's key, and what its owner calls it."""
 

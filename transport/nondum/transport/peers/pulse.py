@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated
 
 from nondum.sdk.codec.checks import Bounds
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import Number
 from nondum.transport.peers.keys import PeerKey
 
 DIGEST_BYTES = 8
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class State:
     """Of what a host tells its peers about itself: enough to see whether anything was missed."""
 
@@ -30,7 +30,7 @@ def _nothing() -> None:
 def _ignore(_peer: PeerKey, _state: State) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pulse:
     """Callbacks of pings: `state` gives this host's state, `receive` takes in a peer's."""
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 LATEST = 64
 """How many refusals are kept in detail."""
@@ -41,7 +41,7 @@ class Reason(Enum):
     INTERNAL = "internal"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Refusal:
     """One connection that was turned away or cut."""
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, assert_never
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.allowance import Paced
 from nondum.transport.peers.calls import Calls
 from nondum.transport.peers.drained import Sent
@@ -59,7 +59,7 @@ class OutOfPlace(Exception):
     """A message that has no place in a session."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Doubt:
     """This host was silent for so long that the peer may have given it up."""
 

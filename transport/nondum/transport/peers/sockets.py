@@ -7,10 +7,10 @@ On one side are connections and who may make them, on the other what peers say o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.identity import Identity
 from nondum.transport.peers.keys import PeerKey
 from nondum.transport.peers.link import Route
@@ -44,7 +44,7 @@ class Receiver(Protocol):
         """It is over, or was never made; why, where that is known."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Owner:
     """What the sockets ask and tell of themselves, on the loop."""
 

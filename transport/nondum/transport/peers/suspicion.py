@@ -7,14 +7,16 @@ and through others; any answer refutes the suspicion. After Lifeguard (Dadgar, P
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
+
+from nondum.sdk.frozen import frozen
 
 V1_SILENCE_S, V1_BEATS, V1_LONGEST_S = 1.0, 3.3, 10.0
 """Version 1 of the protocol gives a link up after this silence, or this number of beats."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Terms:
     """How patient a host is with its peers. Times are in seconds.
 
@@ -81,7 +83,7 @@ class Terms:
         return min(max(beat_s, self.shortest_beat_s), self.longest_beat_s)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Awake:
     """How long this host's loop has run, as its own timer shows."""
 
@@ -113,7 +115,7 @@ class Verdict(Enum):
     DEAD = "it has not answered: give it up"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Watched:
     """What is known of a peer over one link. All times are `Awake.seconds` of this host."""
 

@@ -15,15 +15,16 @@ import socket
 import struct
 import termios
 from contextlib import closing
-from dataclasses import dataclass
 from typing import Any
+
+from nondum.sdk.frozen import frozen
 
 # 8 small fields, 24 u32 (the 13th: last_data_recv), 3 u64, bytes_received, 3 u32, min_rtt.
 _TCP_INFO = struct.Struct("=52xI72xQ12xI")
 _COUNT = struct.Struct("=i")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TcpState:
     """One connection, now."""
 

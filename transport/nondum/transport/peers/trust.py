@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import datetime
 from enum import Enum
 from typing import TypeVar
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import certificate as certificates
 from nondum.transport.peers.certificate import FleetKey
 from nondum.transport.peers.failures import PeerRefused
@@ -28,7 +29,7 @@ class TrustState(Enum):
     REVOKED = "revoked"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Admission:
     """A peer is let in."""
 
@@ -40,7 +41,7 @@ class Admission:
     """When its certificate ends."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Trust:
     """The keys that this host trusts. Every change makes a new value."""
 

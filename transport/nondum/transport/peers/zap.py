@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
@@ -17,6 +16,7 @@ import zmq
 from zmq.utils import z85
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers.drained import Drained
 from nondum.transport.peers.failures import PeerRefused
 
@@ -34,7 +34,7 @@ class Entry(Enum):
     BROKEN = b"500"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConnectionAttempt:
     """A connection that another process wants to make."""
 

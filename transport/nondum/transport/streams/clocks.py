@@ -6,13 +6,13 @@ answer's coming. Source: RFC 5905, section 8, in its simplest form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from nondum.sdk.frozen import frozen
 
 DRIFT = 1e-4
 """How much a clock may gain on another one, as a part of the time: twice what crystals do."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Bounds:
     least_s: float
     most_s: float

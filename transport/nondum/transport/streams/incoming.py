@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import zmq
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.transport.link.token_bucket import TokenBucket
 from nondum.transport.peers import tcp
 from nondum.transport.peers.dialled import Dialled
@@ -32,7 +32,7 @@ OPEN_S = 5.0
 _NEVER_SLOW_S = float("inf")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Place:
     """Where a stream is to be had."""
 

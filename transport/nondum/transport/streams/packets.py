@@ -15,11 +15,11 @@ Pure: whatever a hostile bridge sends, `read_asked` and `read_told` give a value
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, TypeAlias
 
 from nondum.sdk.errors import Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import Buffer
 from nondum.sdk.wire import Body, pack, unpack
 from nondum.sdk.wire_fields import Name, Number, read_field, read_problem
@@ -42,7 +42,7 @@ class Coding(Enum):
     """An image as JPEG; the header tells what it was, and is to be again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Claim:
     """The reader has been granted a stream."""
 
@@ -50,14 +50,14 @@ class Claim:
     token: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Handled:
     """A frame was taken in: another one may be sent."""
 
     seq: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ping:
     """A sign of life of the reader."""
 
@@ -65,7 +65,7 @@ class Ping:
     """On the reader's clock."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Opened:
     """The claim holds."""
 
@@ -73,7 +73,7 @@ class Opened:
     """The stream's type."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Frame:
     """A message of the stream."""
 
@@ -83,7 +83,7 @@ class Frame:
     bulk: Buffer | None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pong:
     """The answer to a ping."""
 
@@ -93,7 +93,7 @@ class Pong:
     """The owner's clock, when it answered."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Over:
     """The stream has ended, or was never to be had."""
 

@@ -9,7 +9,8 @@ longer than the round trip. Small messages may be more.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+
+from nondum.sdk.frozen import frozen
 
 FRAMES = 2
 """Messages that may be under way, whatever their size."""
@@ -23,7 +24,7 @@ SLOW_S = 0.05
 """A frame that is handled sooner than this does not."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Sent:
     seq: int
     length: int

@@ -9,7 +9,7 @@ import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -18,6 +18,7 @@ from packaging.utils import parse_wheel_filename
 
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import InstallFailed, Problem, problems_of
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.build import capture, locking, resolve, source
 from nondum.wheelhouse.build.library_wheels import library_wheel
 from nondum.wheelhouse.build.resolve import Sources
@@ -37,7 +38,7 @@ Progress = Callable[[str, int, int], None]
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Options:
     """How a payload is built."""
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.target import Target
 from nondum.wheelhouse.payload import host_facts
 from nondum.wheelhouse.payload.payload import StagedPayload
@@ -17,7 +17,7 @@ LARGE_BYTES = 100_000_000
 """A payload from this size on is worth a word: a stick takes a minute to be written, or more."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Cost:
     """What one kind of host takes."""
 

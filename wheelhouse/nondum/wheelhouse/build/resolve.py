@@ -10,10 +10,10 @@ import re
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.target import Target
 
 TIMEOUT_S = 1800
@@ -24,7 +24,7 @@ _ABSENT = ("Could not find a version", "No matching distribution")
 """What pip begins with when a wheel is not there."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sources:
     """Where wheels come from."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
@@ -18,6 +17,7 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 from nondum.sdk.errors import ConfigRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import names
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -25,7 +25,7 @@ _RENAMED = {"gitignore": ".gitignore", "pyproject": "pyproject.toml"}
 """By their own names these files would work on the template."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class NewPackage:
     """A package that was written."""
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import tempfile
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.sdk.errors import NondumError, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import contents, manifest
 from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.signatures import Verdict, Verifier
@@ -24,7 +24,7 @@ from nondum.wheelhouse.payload.preflight import preflight
 from nondum.wheelhouse.wheels import wheel
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Verified:
     """What was found out about a payload folder."""
 

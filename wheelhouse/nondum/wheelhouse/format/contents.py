@@ -22,13 +22,13 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import datetime
 from typing import NoReturn
 
 from packaging.version import InvalidVersion, Version
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import names
 
 NAME = "CONTENTS"
@@ -52,7 +52,7 @@ _FLEET = re.compile(r"[a-z0-9.-]{0,64}")
 _HOST = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Entry:
     """One file of a payload."""
 
@@ -62,7 +62,7 @@ class Entry:
     """Relative to the payload folder, with slashes."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Contents:
     """A parsed contents list."""
 

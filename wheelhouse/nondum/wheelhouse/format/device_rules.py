@@ -10,9 +10,10 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TypeAlias
+
+from nondum.sdk.frozen import frozen
 
 Facts: TypeAlias = Mapping[str, Sequence[str]]
 """What is known of a node: word or property → its values, of which one must match."""
@@ -55,7 +56,7 @@ _USB = re.compile(f"{_PAIR}+:{_PAIR}+")
 _INTERFACE = re.compile(f"{_PAIR}+(:{_PAIR}+){{0,2}}")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Verdict:
     """How one rule fared with one node."""
 

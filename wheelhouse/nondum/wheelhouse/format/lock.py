@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import NoReturn
 
@@ -19,6 +18,7 @@ from packaging.tags import Tag
 from packaging.utils import InvalidWheelFilename, canonicalize_name, parse_wheel_filename
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import names
 
 MAX_BYTES = 1024 * 1024
@@ -32,7 +32,7 @@ Environment = Mapping[str, str]
 """Environment markers (PEP 508) of the host that is installed on."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LockedWheel:
     """A wheel that a lock names."""
 
@@ -55,7 +55,7 @@ class LockedWheel:
         return parse_wheel_filename(self.filename)[3]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lock:
     """A parsed lock."""
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from nondum.sdk.description import DeviceNeed
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import confinement, names, tables
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.device_rules import wrong_rules
@@ -35,7 +36,7 @@ _LOCAL_NAME = Form(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Requires:
     """What a host must have."""
 
@@ -50,7 +51,7 @@ class Requires:
     """Whether no other release of it may run beside it: an upgrade stops the old one first."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class UnitMount:
     """Where a unit sits by default on a body (REP-103; metres, radians)."""
 
@@ -59,7 +60,7 @@ class UnitMount:
     rpy: tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ComponentManifest:
     """One component as its author packs it."""
 
@@ -71,7 +72,7 @@ class ComponentManifest:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Manifest:
     """A parsed `payload.toml`."""
 

@@ -7,18 +7,18 @@ bytes of the signature file.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
 from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import goals as goal_file
 from nondum.wheelhouse.format.manifest import GOALS, GRANTABLE, Manifest
 
 MAX_SIGNATURE_BYTES = 8 * 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Grant:
     """What a payload that is believed may have."""
 
@@ -67,7 +67,7 @@ EVERYTHING = Grant(GRANTABLE)
 """What is granted where no signatures are demanded."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Verdict:
     """Whether a contents list may be believed, in whose name, and what for."""
 

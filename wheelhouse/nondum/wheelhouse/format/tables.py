@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 
 MAX_BYTES = 64 * 1024
 MAX_DOTS = 8
@@ -25,7 +26,7 @@ _ASSIGNMENT = re.compile(r"\s*[\"']?([\w-]+)[\"']?\s*=")
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Form:
     """What a string must look like, for machines and in words."""
 

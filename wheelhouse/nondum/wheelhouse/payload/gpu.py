@@ -6,8 +6,9 @@ that end soon: it keeps memory and threads.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+
+from nondum.sdk.frozen import frozen
 
 MODEL = Path("/proc/device-tree/model")
 SHARING = ("Jetson", "Raspberry Pi")
@@ -15,7 +16,7 @@ SHARING = ("Jetson", "Raspberry Pi")
 _MB = 1024 * 1024
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Gpu:
     """The memory of a host's GPUs."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from types import MappingProxyType
 from packaging import markers, tags
 from packaging.tags import Tag
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.target import Target
 from nondum.wheelhouse.payload import memory
@@ -23,7 +23,7 @@ from nondum.wheelhouse.store import disk
 _PLENTY_MB = 2**40
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostFacts:
     """What a host is and has."""
 

@@ -7,12 +7,13 @@ is known; of GPU memory only what all workers use together.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from nondum.sdk.codec.values import from_plain
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.manifest import Requires
 from nondum.wheelhouse.payload import gpu
 from nondum.wheelhouse.payload.gpu import Gpu
@@ -21,7 +22,7 @@ MAX_TOLD = 3
 """Payloads that are told by name."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Promised:
     """What other payloads of a host were promised, all of them together, in MB."""
 
@@ -40,7 +41,7 @@ class Promised:
         return from_plain(cls, said)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Memory:
     """What a host has, in MB."""
 

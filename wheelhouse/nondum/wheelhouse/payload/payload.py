@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +13,7 @@ from typing import TypeVar
 
 from nondum.sdk.description import DeviceNeed, PluginDescription
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import goals, index, lock, manifest, tables
 from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.index import Index
@@ -30,7 +30,7 @@ MAX_METADATA = 16 * 1024 * 1024
 """Bytes of all files together that a payload is judged by."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StagedPayload:
     """A payload whose files are in staging and were checked against its contents list."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import bytecode
 from nondum.wheelhouse.store.unpacking import StoredFile
 
@@ -13,7 +13,7 @@ MANIFEST = "manifest.json"
 FILES = "files"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CompiledFiles:
     """What was compiled of a wheel for one kind of interpreter."""
 
@@ -22,7 +22,7 @@ class CompiledFiles:
     files: tuple[StoredFile, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StoredWheel:
     """A wheel in the store."""
 

@@ -13,10 +13,10 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.fixed_file import Bytes, FixedFile
 from nondum.wheelhouse.wheels import archive, wheel
 from nondum.wheelhouse.wheels.wheel import Layout, PlannedFile
@@ -36,7 +36,7 @@ Progress = Callable[[int, int], None]
 from any thread, one at a time."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StoredFile:
     """One file of a stored wheel."""
 
@@ -45,7 +45,7 @@ class StoredFile:
     sha256: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Source:
     """A wheel to be unpacked, and the empty or absent folder for its files."""
 
@@ -54,7 +54,7 @@ class Source:
     root: Path
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unpacked:
     """What was written of a wheel."""
 

@@ -9,10 +9,10 @@ the manifest asks for) is judged by those who do, from the `Grant` that it gives
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import contents as lists
 from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.manifest import GRANTABLE
@@ -26,7 +26,7 @@ EARLIEST = datetime(2026, 7, 1, tzinfo=UTC)
 """No clock that shows an earlier moment is right: nondum is younger. Raised by each release."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Circumstances:
     """Where and when is judged."""
 
@@ -91,7 +91,7 @@ def clock_unsure(trust: Trust | None, now: datetime) -> Problem | None:
     return Problem("CLOCK_UNSURE", told, "clock", f"{floor:%F} or later", f"{now:%F}", fix)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Judging:
     """The verifier of a host that goes by a trust file, or has none yet."""
 
@@ -103,7 +103,7 @@ class Judging:
         return judge(self.trust, contents, signature, self.at)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Developing:
     """The verifier where `allow_unsigned` is set: what is signed is judged all the same, where
     there is a trust file to judge it by."""
@@ -148,7 +148,7 @@ def _signatures(contents: bytes, signature: bytes | None) -> Sequence[Signature]
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Doubt:
     """What is to be said against a key; nothing is, if it is `key`."""
 

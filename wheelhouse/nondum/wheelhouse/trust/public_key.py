@@ -6,8 +6,8 @@ import base64
 import binascii
 import hashlib
 import re
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.trust.wire import Malformed, Reader, string
 
 ED25519 = "ssh-ed25519"
@@ -31,7 +31,7 @@ class WrongKind(Malformed):
         self.kind = kind[:40]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PublicKey:
     """A key that signatures are checked with."""
 

@@ -10,9 +10,9 @@ import base64
 import binascii
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.trust import public_key
 from nondum.wheelhouse.trust.public_key import FIDO, PublicKey, WrongKind
 from nondum.wheelhouse.trust.wire import Malformed, Reader, string
@@ -35,7 +35,7 @@ _USER_PRESENT = 0x01
 _SIGNATURE_BYTES = 64
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Signature:
     """One signature, well formed; whether it holds, `holds` says."""
 

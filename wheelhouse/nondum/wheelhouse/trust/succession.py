@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem, TrustRefused
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.trust import sshsig, trust_file
 from nondum.wheelhouse.trust.trust import Roots, Trust
 
@@ -29,7 +30,7 @@ _PLACED = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SignedFile:
     """A trust file and its signatures, as bytes that are not parsed yet."""
 
@@ -43,7 +44,7 @@ class SignedFile:
         return hashlib.sha256(self.data).hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Extended:
     """The current trust after files were offered, and which of them were accepted."""
 

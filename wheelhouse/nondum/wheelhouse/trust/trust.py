@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.trust.public_key import PublicKey
 
 ANY = "*"
 """In a role: every payload, or every permission."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustedKey:
     """A key that has a name."""
 
@@ -23,7 +23,7 @@ class TrustedKey:
     """UTC; the first moment at which it is not believed any more."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Roots:
     """Who may change the trust file."""
 
@@ -32,7 +32,7 @@ class Roots:
     """How many of them must have signed the next version."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Role:
     """What some keys may bring, and what that may do."""
 
@@ -56,7 +56,7 @@ class Role:
         return max((_closeness(prefix, payload_id) for prefix in self.payloads), default=-1)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Revocation:
     """A key that is never believed again."""
 
@@ -64,7 +64,7 @@ class Revocation:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bounds:
     """Which releases of a payload may come in."""
 
@@ -75,7 +75,7 @@ class Bounds:
     """Newer ones are refused, and forgotten where they came in before; None: no bound."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Trust:
     """A trust file, one version of it."""
 

@@ -15,9 +15,9 @@ import unicodedata
 import zipfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.contents import MAX_FILE_BYTES
 from nondum.wheelhouse.format.fixed_file import Bytes, pieces
 from nondum.wheelhouse.wheels import outline
@@ -40,7 +40,7 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9¹²³])(\..*)?", re.IGNO
 """Names that are devices on Windows, whatever follows a dot."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Member:
     """A file in the archive."""
 
@@ -56,7 +56,7 @@ class Member:
     is_executable: bool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Archive:
     """What a zip file holds, and what is wrong with it."""
 

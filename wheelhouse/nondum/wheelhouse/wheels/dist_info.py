@@ -11,7 +11,6 @@ import configparser
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from email.message import Message
 from email.parser import HeaderParser
 from pathlib import PurePosixPath
@@ -21,6 +20,8 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 from packaging.tags import Tag, parse_tag
 from packaging.utils import canonicalize_name, parse_wheel_filename
 from packaging.version import InvalidVersion, Version
+
+from nondum.sdk.frozen import frozen
 
 MAX_METADATA = 4 * 1024**2
 MAX_WHEEL = 64 * 1024
@@ -48,7 +49,7 @@ _PLATFORM = re.compile(r"(?:linux|manylinux\d+|(?:many|musl)linux_\d+_\d+)_(\w+)
 _WHEEL_VERSION = re.compile(r"1\.\d{1,4}")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WheelName:
     """What a wheel's file name says."""
 
@@ -80,7 +81,7 @@ class WheelName:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Needs:
     """What a distribution needs, by its METADATA."""
 

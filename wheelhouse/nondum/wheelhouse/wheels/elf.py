@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
+
+from nondum.sdk.frozen import frozen
 
 HEAD_BYTES = 20
 """e_ident, e_type and e_machine."""
@@ -14,7 +15,7 @@ _BITS = {1: 32, 2: 64}
 _ORDERS = {1: "little", 2: "big"}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Elf:
     """What machine code needs of a processor."""
 

@@ -12,9 +12,9 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.fixed_file import Bytes
 from nondum.wheelhouse.wheels import archive
 from nondum.wheelhouse.wheels.archive import Member
@@ -33,7 +33,7 @@ _TRIPLETS = {"armv6l": "arm", "armv7l": "arm", "i686": "i386", "ppc64le": "power
 """How names of files call architectures that tags call otherwise."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Placed:
     """A file of a wheel, its place in site-packages and what it is for; None: no machine code."""
 

@@ -7,15 +7,15 @@ import binascii
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.wheels.archive import MAX_MEMBERS, Member
 
 MAX_BYTES = 8 * 1024**2
 MAX_ROWS = 2 * MAX_MEMBERS
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Row:
     """One row."""
 

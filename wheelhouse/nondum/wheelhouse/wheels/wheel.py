@@ -12,10 +12,11 @@ import hashlib
 import sys
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path, PurePosixPath
 
 from nondum.sdk.errors import PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.fixed_file import Bytes, FixedFile
 from nondum.wheelhouse.wheels import archive, dist_info, extensions, record
 from nondum.wheelhouse.wheels.archive import Member
@@ -32,7 +33,7 @@ SCHEMES = (*LIBRARY_SCHEMES, "scripts", "headers", "data")
 ENTRY_POINTS = "entry_points.txt"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlannedFile:
     """A file of a wheel, and where in site-packages it goes."""
 
@@ -49,7 +50,7 @@ class PlannedFile:
         return self.member.size if self.contents is None else len(self.contents)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Layout:
     """How a wheel is laid out in site-packages."""
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
 from nondum.host.core.events.event import Event
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BehaviourStarted(Event):
     """A behaviour was asked to run."""
 
@@ -19,7 +20,7 @@ class BehaviourStarted(Event):
     arguments: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BehaviourEstablished(Event):
     """A lasting behaviour's effects begin to hold."""
 
@@ -28,7 +29,7 @@ class BehaviourEstablished(Event):
     call_id: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BehaviourProgressed(Event):
     """A behaviour said how far it is."""
 
@@ -40,7 +41,7 @@ class BehaviourProgressed(Event):
     text: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BehaviourEnded(Event):
     """A behaviour ended, however it ended."""
 
@@ -53,7 +54,7 @@ class BehaviourEnded(Event):
     """Why it failed or was halted; what it answered, if it succeeded."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BehavioursHalted(Event):
     """A tick of the task tree took behaviours down: all that one decision halted."""
 

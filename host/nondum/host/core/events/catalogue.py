@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Recomposed(Event):
     """The catalogue has a new revision: components came, went or changed."""
 
@@ -17,7 +17,7 @@ class Recomposed(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CatalogueSetAside(Event):
     """The catalogue's file was damaged or gone: a backup, or a new one, took its place."""
 
@@ -25,7 +25,7 @@ class CatalogueSetAside(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CatalogueUnwritten(Event):
     """What happens is not on disk: the host goes on, and writes it as soon as it can."""
 
@@ -35,7 +35,7 @@ class CatalogueUnwritten(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CatalogueWritten(Event):
     """All that happened is on disk again."""
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostStarted(Event):
     """The daemon is up; `recovered` says what it found half done and did about it."""
 
@@ -17,14 +17,14 @@ class HostStarted(Event):
     recovered: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostStopped(Event):
     """The daemon was told to end, and did."""
 
     host: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SafeModeEntered(Event):
     """The daemon leaves payloads alone, as it has started."""
 
@@ -33,7 +33,7 @@ class SafeModeEntered(Event):
     """Which, and why."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class SafeModeLeft(Event):
     """Payloads are taken in again: a person asked for it, or the host does by itself."""
 
@@ -42,7 +42,7 @@ class SafeModeLeft(Event):
     """Why the host does; empty: a person asked."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrialDue(Event):
     """The daemon has lived long enough to try again something that others died of."""
 
@@ -51,7 +51,7 @@ class TrialDue(Event):
     host: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class HostStable(Event):
     """The daemon has lived for a while beside what others had died of."""
 

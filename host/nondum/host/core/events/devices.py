@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from nondum.host.core.events.event import Event
 from nondum.host.core.records.device import DeviceRecord
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceAppeared(Event):
     """A device is there."""
 
@@ -24,7 +25,7 @@ class DeviceAppeared(Event):
         return {"device": self.device, "identity": self.found.identity, "nodes": nodes}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceChanged(Event):
     """A device that is there has other nodes or properties than before."""
 
@@ -37,14 +38,14 @@ class DeviceChanged(Event):
         return DeviceAppeared(self.device, self.found).to_dict()
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceRemoved(Event):
     """A device was pulled."""
 
     device: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceClaimed(Event):
     """A device was given to the component that declared a need for it."""
 
@@ -53,7 +54,7 @@ class DeviceClaimed(Event):
     need: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceReleased(Event):
     """A component lost a device, or gave it back."""
 

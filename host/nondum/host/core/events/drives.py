@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveInserted(Event):
     """A drive is there: a slot's entry or a block device."""
 
@@ -32,7 +32,7 @@ class DriveInserted(Event):
     """What it says that it is, the same after the machine has started again; empty: nothing."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveQueued(Event):
     """A drive waits until others have been looked through."""
 
@@ -42,7 +42,7 @@ class DriveQueued(Event):
     """How many come before it; 0: its turn has come."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveFlapping(Event):
     """Something comes and goes in a port, so that it is not read before it has stayed a while."""
 
@@ -50,7 +50,7 @@ class DriveFlapping(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveLeftAlone(Event):
     """A disk that could be plugged in is this machine's own: it is never read."""
 
@@ -58,14 +58,14 @@ class DriveLeftAlone(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveRemoved(Event):
     """A drive was pulled, or its source says that it is not there."""
 
     drive: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveRead(Event):
     """A drive has been looked through; `payloads` (keys) are all that it carries."""
 
@@ -79,7 +79,7 @@ class DriveRead(Event):
     """What is on it, and is not taken."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveReleased(Event):
     """A drive was let go of: nothing of it is mounted, and nothing is read from it."""
 
@@ -87,7 +87,7 @@ class DriveReleased(Event):
     drive: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveUnreadable(Event):
     """A drive could not be mounted or looked through, or carries no payload."""
 
@@ -95,7 +95,7 @@ class DriveUnreadable(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DrivesScanned(Event):
     """The source of one kind of drives has told every drive that was there when it started."""
 
@@ -103,7 +103,7 @@ class DrivesScanned(Event):
     drives: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveRetried(Event):
     """A drive that was left alone is to be looked at: a person asked for it, or the host does by
     itself."""

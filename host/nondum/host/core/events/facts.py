@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 from nondum.host.core.events.event import Event
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FactKnown(Event):
     """A component says that something is so."""
 
@@ -21,7 +22,7 @@ class FactKnown(Event):
     """`[type, header]` of a valued fact, as it travels."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FactForgotten(Event):
     """A component says that something is not so, or not known, any more."""
 
@@ -31,7 +32,7 @@ class FactForgotten(Event):
     arguments: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class StreamFlowing(Event):
     """A stream's first message has gone out, or (not `flowing`) it has ended or stalled."""
 
@@ -42,7 +43,7 @@ class StreamFlowing(Event):
     flowing: bool
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class UnitsTaken(Event):
     """What others have in use, as one host tells it: all of it, each time."""
 

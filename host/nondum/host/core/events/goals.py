@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalGiven(Event):
     """A person, or something that speaks for one, wants something."""
 
@@ -22,7 +21,7 @@ class GoalGiven(Event):
     priority: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlanMade(Event):
     """A goal has a plan."""
 
@@ -32,7 +31,7 @@ class PlanMade(Event):
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlanMissing(Event):
     """A goal has no plan as things are; it waits, suspended."""
 
@@ -40,14 +39,14 @@ class PlanMissing(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalReached(Event):
     """A goal holds."""
 
     goal: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalEnded(Event):
     """A goal is not pursued any more: achieved, halted or replaced."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InputAmbiguous(Event):
     """Several streams fit an optional input, and the configuration does not say which it gets."""
 
@@ -16,7 +15,7 @@ class InputAmbiguous(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class InputConnected(Event):
     """A person said which stream an optional input is to get."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,10 +12,11 @@ from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.mount import MountPose
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.signatures import NOTHING, Grant
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadFound(Event):
     """A payload folder was seen on a drive and its contents list read, once."""
 
@@ -41,7 +42,7 @@ class PayloadFound(Event):
     """When, as its signers say: UTC, ISO 8601."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadCopied(Event):
     """What this host needs of the payload lies in staging, each file as its hash says."""
 
@@ -51,7 +52,7 @@ class PayloadCopied(Event):
     """Bytes of wheels that the store had already, so that they were not copied."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadVerified(Event):
     """Manifest, locks, index and wheels were checked, and they fit this host."""
 
@@ -66,14 +67,14 @@ class PayloadVerified(Event):
         return {"payload": self.payload, "components": list(self.components)}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadStaged(Event):
     """The checked copy is in its lasting place; the drive is not needed any more."""
 
     payload: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WheelsStored(Event):
     """Every wheel of the payload is in the store, unpacked and safe on disk."""
 
@@ -82,14 +83,14 @@ class WheelsStored(Event):
     """How many were not in the store before."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ComponentsProbed(Event):
     """Every component's venv was made and its worker said what `index.json` says."""
 
     payload: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadActivated(Event):
     """The payload's components are ready to be entered in the catalogue."""
 
@@ -109,7 +110,7 @@ class PayloadActivated(Event):
         return {**told, "goals": list(self.goals)} if self.goals else told
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadRefused(Event):
     """The payload is not what it claims, or does not fit this host."""
 
@@ -117,7 +118,7 @@ class PayloadRefused(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadFailed(Event):
     """The payload's components could not be brought to life."""
 
@@ -125,7 +126,7 @@ class PayloadFailed(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadWithdrawn(Event):
     """The payload's last source is gone: nothing of it may be used from now on."""
 
@@ -135,14 +136,14 @@ class PayloadWithdrawn(Event):
     """Key of the payload that was built in its place."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadCleared(Event):
     """Nothing of the payload runs, and its venvs, staging and folder are gone."""
 
     payload: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RetryAsked(Event):
     """A refused or quarantined payload is to be tried again: a person asked for it, or the host
     does by itself."""
@@ -152,7 +153,7 @@ class RetryAsked(Event):
     """Why the host does; empty: a person asked."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ForgetAsked(Event):
     """A person asked that a payload that is gone be forgotten."""
 
@@ -160,7 +161,7 @@ class ForgetAsked(Event):
     """Its id: there is no key of what is gone."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Recovered(Event):
     """A payload was found half done when the daemon started, and sent forward or back."""
 
@@ -169,7 +170,7 @@ class Recovered(Event):
     """The step that it was found at."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ProgressMade(Event):
     """A step of an installation is `done` of `total` through."""
 
@@ -180,7 +181,7 @@ class ProgressMade(Event):
     total: int
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WheelsCompiled(Event):
     """Workers of a payload find its modules compiled when they are started again."""
 

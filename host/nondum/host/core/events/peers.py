@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from nondum.host.core.events.event import Event
 from nondum.host.core.records.peer import PeerRecord
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CertificatesBrought(Event):
     """A drive carries certificates of hosts, this one's perhaps."""
 
@@ -23,7 +24,7 @@ class CertificatesBrought(Event):
         return {"drive": self.drive, "certificates": len(self.certificates)}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerJoined(Event):
     """A peer is there; what it offers is told by `PeerShared`."""
 
@@ -37,7 +38,7 @@ class PeerJoined(Event):
     """Names its run."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerShared(Event):
     """A peer offers something, or something else than before."""
 
@@ -51,7 +52,7 @@ class PeerShared(Event):
         return {"host": self.host, "address": self.peer.address, "components": offered}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerLeft(Event):
     """A peer is gone: nothing that it offered may be used from now on."""
 
@@ -61,7 +62,7 @@ class PeerLeft(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerTurnedAway(Event):
     """Somebody who may not be a peer tried to be one."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadSentAway(Event):
     """A person wants the payload on another host: it leaves this one, and its drive stays in."""
 
@@ -19,7 +18,7 @@ class PayloadSentAway(Event):
     """What is told of it here from now on."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadPlaced(Event):
     """A payload that does not run here runs on a peer now."""
 
@@ -29,7 +28,7 @@ class PayloadPlaced(Event):
     why: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlaceLost(Event):
     """A payload does not run any more on the peer that it was placed on."""
 
@@ -39,7 +38,7 @@ class PlaceLost(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlaceMissing(Event):
     """No peer that is there takes a payload that does not run here."""
 
@@ -48,7 +47,7 @@ class PlaceMissing(Event):
     """What each of them has said, `where` its name."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadTaken(Event):
     """A peer's payload runs here, since it does not run there."""
 

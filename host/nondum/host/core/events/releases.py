@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BesideRefused(Event):
     """A release cannot run beside the active one, which has to stop first."""
 
@@ -16,7 +15,7 @@ class BesideRefused(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrialFailed(Event):
     """A worker ended that was tried beside the active one: its release does not work."""
 
@@ -25,7 +24,7 @@ class TrialFailed(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadSuperseded(Event):
     """Another release of the payload is active or becomes active; this one waits beside it."""
 
@@ -35,7 +34,7 @@ class PayloadSuperseded(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadResumed(Event):
     """A release that waited beside another one is wanted: it is brought up (again)."""
 
@@ -43,7 +42,7 @@ class PayloadResumed(Event):
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RollbackAsked(Event):
     """A person asked for an earlier release of a payload, this once: rollback protection lets it
     pass until it is unplugged or a newer one comes."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.host.core.events.event import Event
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustRead(Event):
     """A daemon that starts has read and verified the trust file that it goes by."""
 
@@ -18,7 +17,7 @@ class TrustRead(Event):
     """Who vouches for the first one, in words: `nondum.host.trust.anchors.Origin`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustChanged(Event):
     """Another version of the trust file is active, and safe on disk."""
 
@@ -28,7 +27,7 @@ class TrustChanged(Event):
     """The drive that brought it, or `person`."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TrustFileRefused(Event):
     """A trust file was not taken; the active one stays."""
 
@@ -37,7 +36,7 @@ class TrustFileRefused(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadDistrusted(Event):
     """A payload that is here is not trusted any more: its key was revoked, say. It is withdrawn."""
 
@@ -45,7 +44,7 @@ class PayloadDistrusted(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadDoubted(Event):
     """A payload that is here is not trusted any more, and stays all the same; or, without
     `problems`, is trusted again."""
@@ -54,13 +53,13 @@ class PayloadDoubted(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ClockDoubted(Event):
     """The wall clock shows a moment that is certainly past."""
 
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ClockRight(Event):
     """The wall clock, which was doubted, may be right again."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 from nondum.host.core.events.event import Event
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerReady(Event):
     """A worker runs its plugin and has described it."""
 
@@ -20,7 +21,7 @@ class WorkerReady(Event):
     """Key of the payload whose worker it is: two releases may run side by side."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerExited(Event):
     """A worker ended or was ended, and will be started again unless a failure follows."""
 
@@ -35,7 +36,7 @@ class WorkerExited(Event):
         return {"component": self.component, "reason": self.reason, "payload": self.payload}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerStable(Event):
     """A worker that was started again has lived for a while: what was wrong is past."""
 
@@ -43,7 +44,7 @@ class WorkerStable(Event):
     payload: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerFailed(Event):
     """A worker will not be started again: it is quarantined."""
 
@@ -52,7 +53,7 @@ class WorkerFailed(Event):
     payload: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerStrained(Event):
     """A worker uses nearly all that it may, or spins; it goes on. Told again only after a calm."""
 
@@ -60,7 +61,7 @@ class WorkerStrained(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerFaulted(Event):
     """A worker's plugin made a mistake that is not its end: it goes on. Each is told once."""
 
@@ -68,7 +69,7 @@ class WorkerFaulted(Event):
     problems: tuple[Problem, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ConditionEnded(Event):
     """A condition ended with an error: nothing tells its facts any more."""
 
@@ -78,7 +79,7 @@ class ConditionEnded(Event):
     payload: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class WorkerLogged(Event):
     """A plugin logged a line."""
 

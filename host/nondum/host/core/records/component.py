@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from nondum.host.core.records.device import DeviceClaim
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
 class ComponentState(Enum):
@@ -24,7 +25,7 @@ class ComponentState(Enum):
     """Its worker failed too often; it waits for a replug or a person."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ComponentRecord:
     """A component of an active payload."""
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from nondum.sdk.frozen import frozen
 
-@dataclass(frozen=True, slots=True)
+
+@frozen
 class DeviceNode:
     """What is opened to use a device, or a part of it."""
 
@@ -23,7 +24,7 @@ class DeviceNode:
         return self.properties.get("SUBSYSTEM", "")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceInterface:
     """One of the functions of a USB device."""
 
@@ -34,7 +35,7 @@ class DeviceInterface:
     """The kernel's; empty: none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceRecord:
     """A physical device that is plugged in, wanted or not, with all its nodes."""
 
@@ -69,7 +70,7 @@ class DeviceRecord:
         return f"{kind} {self.serial}" if self.serial else f"{kind} at {self.port}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KnownDevice:
     """A device that was seen on this host, whether it is there or not."""
 
@@ -82,7 +83,7 @@ class KnownDevice:
     """When it was last plugged in or pulled, in seconds since 1970."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DeviceClaim:
     """A declared need of a component and the device that serves it, if one is there."""
 

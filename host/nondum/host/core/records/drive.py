@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 from nondum.host.core.records.moment import UNKNOWN_MOMENT, Moment
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 INSTALLED = "installed"
 """Kind of the drives that stand for initial components: no source watches them."""
@@ -24,7 +24,7 @@ class DriveState(Enum):
     """Nothing is wanted of it any more; it is unmounted and safe to pull."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class DriveRecord:
     """A drive that is in."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from nondum.planning.merge.goal import GoalKind
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GoalRecord:
     """A goal that was given and is not over: a daemon that starts takes it up again."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from nondum.sdk.frozen import frozen
 
 Xyz = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MountPose:
     """Where a unit sits in its host's body frame (REP-103: x forward, y left, z up)."""
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from nondum.host.core.records.moment import Moment
 from nondum.host.core.records.step import Step
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PayloadRecord:
     """A payload that this host knows of now: on a drive, or installed."""
 
@@ -47,7 +48,7 @@ class PayloadRecord:
         return {ids.get(name, name): name for name in self.components}
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rollback:
     """A person wants an earlier release of a payload to be active."""
 
@@ -58,7 +59,7 @@ class Rollback:
     """The newest release that it goes before; a newer one counts again."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FormerPayload:
     """A payload that was active here and is gone: what it could do, so that it can be named when
     something is missing. Nothing of it runs, and none of its files are kept by this."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from nondum.host.core.records.mount import MountPose
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.signature import parse_signature
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerComponent:
     """What a peer offers this host of one of its components."""
 
@@ -45,7 +46,7 @@ class PeerComponent:
         return f"{self.life} {self.version}"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PeerRecord:
     """A peer that is there, and what it shares."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.device import DeviceRecord, KnownDevice
@@ -14,9 +14,10 @@ from nondum.host.core.records.payload import FormerPayload, PayloadRecord
 from nondum.host.core.records.peer import PeerComponent, PeerRecord
 from nondum.host.core.records.safety import Safety
 from nondum.planning.merge.given_names import GivenNames
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Snapshot:
     """The catalogue at one revision."""
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from nondum.host.peers.placement.decide import Candidate, Parcel
 from nondum.host.peers.placement.handover import Handover
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 AGAIN_S = 30.0
 """After so long, a peer that did not take a payload is asked again: memory and disk get free."""
 STEPS = ("waiting", "checking", "fetching", "installing", "active")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Declined:
     """Why a peer did not take a payload."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +12,7 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import PeerKey
 
 PLACED = "placed"
@@ -50,7 +50,7 @@ _HERE = INSTALLING | {
 Compute: TypeAlias = Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Parcel:
     """A payload that is to run on another host."""
 
@@ -76,7 +76,7 @@ class Parcel:
         return "; ".join(dict.fromkeys(_need(problem) for problem in self.problems))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Candidate:
     """A peer that takes payloads."""
 

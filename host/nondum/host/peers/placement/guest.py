@@ -11,6 +11,7 @@ from typing import Any
 
 from nondum.host.core.printable import printable
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import CallFailed, IncomingCall
 from nondum.wheelhouse.format import contents, names
 from nondum.wheelhouse.format.signatures import MAX_SIGNATURE_BYTES
@@ -21,7 +22,7 @@ PROGRESS_S = 0.2
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Offer:
     """A payload that a peer wants to run here."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +17,13 @@ from nondum.host.manager.state_folders import Folders, remove
 from nondum.host.peers.placement.decide import Parcel
 from nondum.host.sandbox.helper import privileged
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 from nondum.transport.peers import CallFailed
 from nondum.wheelhouse.format import contents
 from nondum.wheelhouse.format.signatures import MAX_SIGNATURE_BYTES
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Described:
     """What is told first of a payload."""
 

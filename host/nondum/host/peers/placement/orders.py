@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.control.arguments import Arguments
@@ -21,9 +20,10 @@ from nondum.host.peers.placement.pins import Pins
 from nondum.host.peers.placement.placing import Placing
 from nondum.host.peers.placement.taking import Taking
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PlaceOrders:
     """Each method is a verb."""
 

@@ -12,11 +12,11 @@ import itertools
 import secrets
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.jobs.fork_client import ForkClient, Forked
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
+from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import read_problem
 from nondum.transport import WorkerLink
 from nondum.transport.peers.keys import PeerKey
@@ -33,7 +33,7 @@ NAME = "bridge"
 OnOver = Callable[[Problem], None]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Grant:
     """What the reader of an exported stream must know to claim it."""
 
@@ -44,13 +44,13 @@ class Grant:
     token: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Export:
     reader: PeerKey
     on_over: OnOver
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Running:
     process: Forked
     link: WorkerLink

@@ -6,7 +6,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from nondum.host.core.events.catalogue import CatalogueUnwritten, CatalogueWritten
@@ -21,9 +20,10 @@ from nondum.host.people.feedback.outputs import Outlet
 from nondum.host.people.feedback.showing import Durations, Shown
 from nondum.host.people.feedback.state_reasons import Known, refusal, state_reasons
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sources:
     """Where it is known from what the host is at."""
 

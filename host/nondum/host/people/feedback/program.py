@@ -9,9 +9,9 @@ import os
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from nondum.sdk.errors import InstallFailed, Problem
+from nondum.sdk.frozen import frozen
 
 log = logging.getLogger(__name__)
 
@@ -22,7 +22,7 @@ _END_S = 1.0
 """How long a killed program, and what it has left behind, is waited for."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ended:
     """How a program ended."""
 

@@ -8,16 +8,17 @@ no longer in any case.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 from nondum.host.core.feedback_state import NOTHING, PRIORITY, State, StateReason
+from nondum.sdk.frozen import frozen
 
 Since: TypeAlias = Mapping[tuple[State, str, str], float]
 """State, what about, and code → when it was first known, in seconds of a clock that only rises."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Durations:
     """How long news are shown."""
 
@@ -29,7 +30,7 @@ class Durations:
         return {State.REFUSED: self.refused_s, State.SAFE: self.safe_s}.get(state)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Shown:
     """What is shown now."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
 
 from nondum.host.core.feedback_state import State, StateReason
 from nondum.host.core.records.component import ComponentState
@@ -15,13 +14,14 @@ from nondum.host.core.records.step import Step
 from nondum.host.core.status import is_at_rest, waits_for_devices
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 PLUGGED = frozenset({"slot", "block"})
 """Kinds of drives that people plug in and pull."""
 _WELL = frozenset({Step.ACTIVE, Step.SUPERSEDED})
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Known:
     """All that the state is made of."""
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from nondum.sdk.frozen import frozen
 
-@dataclass(frozen=True, slots=True)
+
+@frozen
 class Mounted:
     """One mounted hierarchy."""
 

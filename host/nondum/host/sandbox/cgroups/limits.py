@@ -6,8 +6,9 @@ Sources: kernel.org, Documentation/admin-guide/cgroup-v2.rst and cgroup-v1/{memo
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Protocol
+
+from nondum.sdk.frozen import frozen
 
 MEGABYTE = 1024 * 1024
 NAME = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,62})\.[0-9]{1,9}")
@@ -16,7 +17,7 @@ WEIGHT = 100
 """Processor weight of a process that has no own weight (cpu.weight)."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CgroupLimits:
     """What all processes of one worker may use together."""
 
@@ -41,7 +42,7 @@ class CgroupLimits:
             raise ValueError(f"{self.processors} is no number of processors")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Usage:
     """What the processes of a cgroup use, and how often they met its limits. 0: not known."""
 

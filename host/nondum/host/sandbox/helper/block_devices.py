@@ -6,12 +6,12 @@ import os
 import re
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from nondum.host.sandbox.helper import system_disks
 from nondum.host.sandbox.helper.mountinfo import Mount, device_number, mounts
 from nondum.host.sandbox.helper.system_disks import Block, Named, Use
+from nondum.sdk.frozen import frozen
 
 UNITS = tuple(
     map(
@@ -31,7 +31,7 @@ UNITS = tuple(
 _UNIT = (".mount", ".swap")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Machine:
     """Where a machine tells of its disks: sysfs(5), proc(5), fstab(5), crypttab(5), udev's links,
     units of systemd.

@@ -10,11 +10,11 @@ import contextlib
 import ctypes
 import os
 import stat
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.sandbox.helper.requests import refused
 from nondum.sdk.errors import NondumError
+from nondum.sdk.frozen import frozen
 
 SYS = Path("/sys")
 SIZE = "size=256k,nr_inodes=4096,mode=0755"
@@ -32,7 +32,7 @@ HUB = "09"
 STORAGE = "08"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Nodes:
     """The folders below `base`, whose nodes belong to `uid`, the daemon's, or to a worker's."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import stat
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from nondum.host.sandbox.helper.block_devices import Machine
@@ -11,9 +11,10 @@ from nondum.host.sandbox.helper.drive_nodes import mounted_elsewhere
 from nondum.host.sandbox.helper.mountinfo import device_number
 from nondum.host.sandbox.helper.requests import refused
 from nondum.sdk.errors import PayloadRefused
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Disks:
     """Judges block devices by sysfs(5), and by what the machine needs them for."""
 

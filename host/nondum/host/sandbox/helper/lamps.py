@@ -10,13 +10,13 @@ import fnmatch
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 from nondum.host.core.feedback_state import State
 from nondum.host.sandbox.helper.lamp_patterns import PATTERNS, Pattern
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
+from nondum.sdk.frozen import frozen
 
 LEDS = Path("/sys/class/leds")
 MOST_LAMPS = 64
@@ -27,7 +27,7 @@ Before: TypeAlias = dict[str, tuple[str, str]]
 """Lamp → its trigger and its brightness before the first state."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Lamps:
     """The lamps that an integrator has chosen. All of it may block: not for the loop."""
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, TypeAlias, get_args
 
 from nondum.host.core.feedback_state import State
@@ -19,6 +18,7 @@ from nondum.sdk import wire
 from nondum.sdk.codec.checks import Bounds, matching
 from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import NondumError, Problem, ProtocolViolation
+from nondum.sdk.frozen import frozen
 
 MAX_BYTES = 1024
 """Of a request."""
@@ -45,7 +45,7 @@ Pid: TypeAlias = Annotated[int, Bounds(0, 2**31 - 1)]
 """Above it the kernel's calls do not take them."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Mount:
     """Mount a drive for reading; the answer is where."""
 
@@ -58,7 +58,7 @@ class Mount:
     use: Use
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Unmount:
     """Unmount a drive."""
 
@@ -67,12 +67,12 @@ class Unmount:
     use: Use
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class UnmountAll:
     """Unmount all drives: what a daemon left that died."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class PutNode:
     """Make a node of a character device in a component's folder; the answer is where."""
 
@@ -84,7 +84,7 @@ class PutNode:
     """Whose it is: a worker's; None: the daemon's."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class TakeNode:
     """Remove a node."""
 
@@ -92,21 +92,21 @@ class TakeNode:
     need: Need
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ClearNodes:
     """Remove all nodes of a component; empty: of all."""
 
     component: Annotated[str, matching(re.compile(f"({COMPONENT.pattern})?"))]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MapUsers:
     """Have a user namespace that a process of the daemon's has made know the users of workers."""
 
     pid: Pid
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MapFolder:
     """Have a mount, which comes as a descriptor, show the daemon's files as those of a worker."""
 
@@ -114,38 +114,38 @@ class MapFolder:
     """The worker's."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ShowLamps:
     """Have the lamps that root's configuration names show a state."""
 
     state: State
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class EndLamps:
     """Have them show what they showed before."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ListCgroups:
     """Which kind of cgroups there is, what they limit, and which cgroups there are."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ReadCgroup:
     """What a cgroup uses, and the processes in it."""
 
     cgroup: Cgroup
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class MakeCgroup:
     """Make a cgroup without limits."""
 
     cgroup: Cgroup
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LimitCgroup:
     """Set a cgroup's limits."""
 
@@ -161,7 +161,7 @@ class LimitCgroup:
         return CgroupLimits(self.memory_mb, self.tasks, self.cpu_weight, self.processors)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class FillCgroup:
     """Put a process of the caller's own user into a cgroup."""
 
@@ -169,21 +169,21 @@ class FillCgroup:
     pid: Pid
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KillCgroup:
     """SIGKILL all that is in a cgroup."""
 
     cgroup: Cgroup
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class RemoveCgroup:
     """Remove an empty cgroup; the answer is whether it is gone."""
 
     cgroup: Cgroup
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ListenToStopKey:
     """Tell each press of the key that root's configuration names, until the caller hangs up.
 

@@ -8,7 +8,7 @@ import signal
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,13 @@ from nondum.host.sandbox.helper.drive_nodes import drive_name
 from nondum.host.sandbox.helper.lamps import Lamps
 from nondum.host.sandbox.helper.requests import Request, refused
 from nondum.host.sandbox.helper.stop_key import PressesOfDevice
+from nondum.sdk.frozen import frozen
 
 MOST_DRIVES = 128
 MOST_CGROUPS = 512
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Service:
     """Root's end."""
 

@@ -9,10 +9,11 @@ than that one partition.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePath, PurePosixPath
 
 from nondum.host.sandbox.helper.mountinfo import Mount, unescaped
+from nondum.sdk.frozen import frozen
 
 PEOPLES = tuple(map(PurePosixPath, ("/media", "/run/media", "/mnt")))
 """Where people, and desktops for them, mount what they plug in (file-hierarchy(7))."""
@@ -27,7 +28,7 @@ _AT_BOOT = ("root", "resume", "mount.usr")
 """What of the kernel's command line names a disk (kernel-command-line(7))."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Block:
     """A block device, as sysfs shows it."""
 
@@ -39,7 +40,7 @@ class Block:
     """Devices that are made of it: logical volumes, arrays, what is decrypted."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Named:
     """A device that the machine's configuration names, by a path below /dev."""
 
@@ -47,7 +48,7 @@ class Named:
     why: str
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Use:
     """What a block device is needed for."""
 

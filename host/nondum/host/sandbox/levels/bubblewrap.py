@@ -11,11 +11,12 @@ import os
 import shutil
 import sys
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from nondum.host.sandbox.helper.client import DEVICES
 from nondum.host.sandbox.levels.users import NewNamespace
+from nondum.sdk.frozen import frozen
 
 OUTSIDE = "/.host"
 """Where the host's folders are seen, until the worker leaves init's mount namespace."""
@@ -65,7 +66,7 @@ def places_of_nodes() -> tuple[str, ...]:
     return ("/dev", *([str(DEVICES)] if os.geteuid() != 0 and DEVICES.is_dir() else ()))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Ground:
     """What an interpreter is started with; a worker that needs no other may be made of it."""
 

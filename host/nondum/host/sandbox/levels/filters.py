@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from nondum.host.sandbox.levels.system_calls import Architecture
+from nondum.sdk.frozen import frozen
 
 _LOAD = 0x20  # BPF_LD | BPF_W | BPF_ABS
 _IF_EQUAL = 0x15  # BPF_JMP | BPF_JEQ | BPF_K
@@ -30,7 +30,7 @@ _ARGUMENTS = 16
 LONGEST = 4096  # BPF_MAXINSNS
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Rule:
     """One system call that is refused, always or for some values of one argument."""
 
@@ -56,7 +56,7 @@ class Rule:
         return not (self.equal or self.any_bit or self.other_than)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Instruction:
     """`struct sock_filter`."""
 

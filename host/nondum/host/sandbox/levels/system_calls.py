@@ -7,7 +7,8 @@ Sources: Linux, arch/x86/entry/syscalls/syscall_64.tbl and include/uapi/asm-gene
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from nondum.sdk.frozen import frozen
 
 _SAME = {
     "pidfd_send_signal": 424,
@@ -197,7 +198,7 @@ _AARCH64 = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Architecture:
     """How a kernel's filters know a machine (linux/audit.h) and its calls."""
 

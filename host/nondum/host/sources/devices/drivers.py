@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 from nondum.host.core.records.device import DeviceRecord
@@ -11,6 +10,7 @@ from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.mind.diagnosis import moment
 from nondum.host.sources.devices.matching import left_alone, serving
 from nondum.sdk.description import PluginDescription
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.device_rules import names_id
 
 
@@ -38,7 +38,7 @@ class Payload(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Remembered:
     """A payload that was here."""
 
@@ -48,7 +48,7 @@ class Remembered:
     components: Mapping[str, PluginDescription]
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Driver:
     """What of a payload would use a device."""
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from nondum.host.core.records.device import DeviceInterface, DeviceNode, DeviceRecord
+from nondum.sdk.frozen import frozen
 
 RAW = "usb"
 """Subsystem of the node by which a USB device is used without a driver of the kernel."""
@@ -24,7 +25,7 @@ _INHERITED = re.compile(r"ID_(?!PATH|INPUT|FOR_SEAT|USB_DRIVER)")
 """Properties by which a device is identified: its parts have them, too."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Part:
     """Something in sysfs: a device, an interface of one, or what has a node."""
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from nondum.host.core.records.device import DeviceNode, DeviceRecord
 from nondum.host.sources.devices.hardware import RAW
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.device_rules import NAMING_NODES, Verdict, judged, names_id
 
 KEYBOARD, POINTER = "01", "02"
@@ -20,7 +20,7 @@ _INPUT_SUBSYSTEMS = frozenset({"input", "hidraw"})
 _POINTS = ("ID_INPUT_MOUSE", "ID_INPUT_TOUCHPAD", "ID_INPUT_TOUCHSCREEN", "ID_INPUT_POINTINGSTICK")
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Trial:
     """How one node fared with one need."""
 

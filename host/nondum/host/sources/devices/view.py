@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -51,14 +52,17 @@ def device_row(device: DeviceRecord, held: Held) -> Row:
     }
 
 
+_FIELDS = tuple(field.name for field in fields(DeviceRecord))
+
+
 def device_of(row: Mapping[str, Any]) -> DeviceRecord:
     """The device of a row that another process of this host's nondum has made."""
-    fields = {name: row[name] for name in DeviceRecord.__slots__}
+    given = {name: row[name] for name in _FIELDS}
     nodes = tuple(
         DeviceNode(Path(n["node"]), n["properties"], n["interface"]) for n in row["nodes"]
     )
     interfaces = tuple(DeviceInterface(**one) for one in row["interfaces"])
-    return DeviceRecord(**{**fields, "nodes": nodes, "interfaces": interfaces})
+    return DeviceRecord(**{**given, "nodes": nodes, "interfaces": interfaces})
 
 
 def known_row(known: KnownDevice) -> Row:

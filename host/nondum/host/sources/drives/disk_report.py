@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 from nondum.host.sandbox.helper.block_devices import Machine
 from nondum.host.sandbox.helper.system_disks import Use
+from nondum.sdk.frozen import frozen
 
 SECTOR = 512
 """What sysfs counts sizes in, whatever the disk does."""
@@ -31,7 +31,7 @@ class Owner(Enum):
     """It is no drive as a whole: its partitions may be."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Disk:
     """A disk or partition."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.planning.explain.advise.candidate import Candidate, Here
 from nondum.planning.explain.advise.minimal import Enumeration
@@ -11,6 +11,7 @@ from nondum.planning.explain.advise.relevance import relevant
 from nondum.planning.explain.advise.trial import Chosen, Outcome, Trial, Trials
 from nondum.planning.explain.conflict import Search
 from nondum.planning.merge.goal import read_goal
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import GroundTask, Plan
 
 WAYS_LIMIT = 20
@@ -19,7 +20,7 @@ TRIALS_LIMIT = 300
 """Sets of payloads that are planned for, at most."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Way:
     """Payloads, none of which can be spared, and the plan that they would give."""
 
@@ -33,7 +34,7 @@ class Way:
         return tuple(self.task.actions[index].name for index in self.plan.steps)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Advice:
     """What would make a goal possible."""
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from nondum.planning.merge.contribution import Contribution
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Here:
     """A host as planning sees it now."""
 
@@ -33,7 +34,7 @@ class Here:
         return replace(self, contributions=tuple(found.values()), facts=frozenset(facts))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Candidate:
     """A payload that is not here, as planning would see it if it were."""
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -22,12 +21,13 @@ from nondum.planning.pddl.facts import predicate_of
 from nondum.planning.pddl.normal import Condition, atoms_in
 from nondum.planning.pddl.syntax import And, Formula, Not, Or, Quantified, TypedName, terms_of
 from nondum.planning.pddl.typegraph import TypeGraph, types_or_root
+from nondum.sdk.frozen import frozen
 
 SignedPredicate: TypeAlias = tuple[str, bool]
 """A predicate, and whether facts of it are to be true."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Schema:
     """An action or rule, as far as relevance goes."""
 
@@ -37,7 +37,7 @@ class Schema:
     """Whatever else it acts upon must be of these."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Sketch:
     """What one component brings, by name."""
 

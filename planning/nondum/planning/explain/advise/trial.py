@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum, auto
 
 from nondum.planning.explain.advise.candidate import Candidate, Here
@@ -19,6 +19,7 @@ from nondum.planning.pddl.facts import parts
 from nondum.planning.search.interruptions import cut_short
 from nondum.planning.search.validate import validate
 from nondum.sdk.errors import FragmentRefused, GoalRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import AlreadyTrue, GroundTask, Plan, Unsolvable
 
 Chosen = frozenset[int]
@@ -38,7 +39,7 @@ class Outcome(Enum):
     """It was not found out within bounds."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Trial:
     """One set of payloads, tried out."""
 

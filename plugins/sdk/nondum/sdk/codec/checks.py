@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
+
+from nondum.sdk.frozen import frozen
 
 
 class Mismatch(ValueError):
@@ -28,7 +29,7 @@ class Mismatch(ValueError):
         return Mismatch(self.reason, place + self.place)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bounds:
     """What a number, or the length of anything else, is at least and at most."""
 

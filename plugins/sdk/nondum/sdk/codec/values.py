@@ -1,6 +1,6 @@
 """Typed values to plain data and back, as the annotations of frozen dataclasses say. Pure.
 
-    @dataclass(frozen=True, slots=True)
+    @frozen
     class Mount:
         device: Annotated[str, matching(DEVICE)]
         diskseq: int | None

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Message
 from nondum.sdk.messages.header import Header
 from nondum.sdk.messages.images import CameraModel
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BoundingBox2D:
     """An upright box in the image, by its centre and size in pixels."""
 
@@ -25,7 +25,7 @@ class BoundingBox2D:
     """px"""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Detection:
     """One thing found."""
 
@@ -39,7 +39,7 @@ class Detection:
     """The same over time where the detector follows things; empty where it does not."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Detections(Message):
     """All that was found in one image; its stamp and frame are the image's."""
 

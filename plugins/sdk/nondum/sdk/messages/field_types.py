@@ -16,12 +16,13 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 from nondum.sdk.errors import Problem
+from nondum.sdk.frozen import frozen
 
 _Check: TypeAlias = Callable[[Any], "tuple[str, str] | None"]
 """None where a value is right; else the rest of the way to what is wrong, and what is."""
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@frozen
 class _Checks:
     """How the fields of one dataclass are checked; it has two of them at least."""
 

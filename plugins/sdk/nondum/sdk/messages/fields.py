@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self, TypeAlias, Union, get_args, get_origin, 
 from nondum.sdk.codec.checks import Mismatch
 from nondum.sdk.codec.values import fields_reader
 from nondum.sdk.errors import MessageInvalid, Problem
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.field_types import type_problems
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
@@ -87,7 +88,7 @@ def _bulk(buffer: Buffer | None, place: str) -> Buffer:
     return buffer
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@frozen
 class _Codec:
     """How one dataclass is read and written."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Buffer, Message
 from nondum.sdk.messages.header import Header
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 MAX_SIDE_PX = 32_768
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class CameraModel:
     """A pinhole camera without distortion; all in pixels (sensor_msgs/CameraInfo's K).
 
@@ -36,7 +36,7 @@ class CameraModel:
     """y of the optical axis, px."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class _Encoding:
     dtype: str
     channels: int
@@ -125,7 +125,7 @@ class _Raster(Message):
             yield "the camera's focal lengths are not positive"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Image(_Raster):
     """An image of a camera. Encodings: rgb8, bgr8, mono8, mono16 (little-endian)."""
 
@@ -151,7 +151,7 @@ class Image(_Raster):
     """How pixels are directions; None where that is not known."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Depth(_Raster):
     """Distances along the optical axis. 16UC1: millimetres; 32FC1: metres. 0 or NaN: none."""
 

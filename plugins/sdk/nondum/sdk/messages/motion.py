@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Message
 from nondum.sdk.messages.header import Header
 
@@ -18,7 +18,7 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 UNIT_LENGTH_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Twist(Message):
     """A velocity of a body (geometry_msgs/TwistStamped), in the axes of the header's frame.
 
@@ -33,7 +33,7 @@ class Twist(Message):
     """rad/s"""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Pose(Message):
     """Where a frame is (geometry_msgs/PoseStamped; nav_msgs/Odometry when the child is named)."""
 
@@ -60,7 +60,7 @@ class Pose(Message):
             yield "the orientation is not a quaternion of length 1"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Bearing(Message):
     """A direction to something, as seen from the origin of the header's frame."""
 

@@ -7,9 +7,9 @@ None, where ROS has NaN or -1.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Message
 from nondum.sdk.messages.header import Header
 from nondum.sdk.messages.motion import Quaternion, Vector, is_unit
@@ -18,7 +18,7 @@ Covariance: TypeAlias = tuple[float, float, float, float, float, float, float, f
 """3×3, row by row; symmetric, its diagonal not negative."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class GpsFix(Message):
     """A position on Earth by satellites (sensor_msgs/NavSatFix), in WGS 84.
 
@@ -52,7 +52,7 @@ class GpsFix(Message):
         yield from _covariance_faults("covariance", self.covariance)
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class ImuData(Message):
     """What an inertial measurement unit senses (sensor_msgs/Imu), along its frame's axes."""
 
@@ -80,7 +80,7 @@ class ImuData(Message):
             yield from _covariance_faults(field, getattr(self, field))
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class BatteryState(Message):
     """How a battery is (sensor_msgs/BatteryState)."""
 

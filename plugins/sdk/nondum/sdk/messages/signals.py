@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Buffer, Message
 from nondum.sdk.messages.header import Header
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Audio(Message):
     """A piece of sound, channels interleaved. Encodings: s16le, f32le (-1..1)."""
 
@@ -42,7 +42,7 @@ class Audio(Message):
             yield "the samples end within a frame"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Text(Message):
     """Words, said or to be said."""
 
@@ -54,7 +54,7 @@ class Text(Message):
     """BCP 47."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Scalar(Message):
     """One measured number."""
 
@@ -66,7 +66,7 @@ class Scalar(Message):
     """SI symbol: `V`, `°C`, `Sv/h`; `1` where there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KeyValue:
     """One value by name (diagnostic_msgs/KeyValue)."""
 
@@ -76,7 +76,7 @@ class KeyValue:
     """For people and logs. A number that others work with is a `Scalar`, which has a unit."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class KeyValues(Message):
     """Values by name (diagnostic_msgs/DiagnosticStatus), where no other message type fits."""
 
@@ -94,7 +94,7 @@ class KeyValues(Message):
             yield "a key stands there twice"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Points(Message):
     """A cloud of points (sensor_msgs/PointCloud2 with x, y, z): N×3 float32, metres."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from nondum.sdk.frozen import frozen
 from nondum.sdk.messages.fields import Buffer, Message
 from nondum.sdk.messages.header import Header
 from nondum.sdk.messages.motion import Quaternion, Vector, is_unit
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MAX_SIDE_CELLS = 32_768
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class LaserScan(Message):
     """One sweep of a planar laser (sensor_msgs/LaserScan), in the xy plane of the header's frame.
 
@@ -76,7 +76,7 @@ class LaserScan(Message):
             yield "the bytes end within a range"
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class OccupancyGrid(Message):
     """A map of cells (nav_msgs/OccupancyGrid), in the plane of its origin's frame.
 
