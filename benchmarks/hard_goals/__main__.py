@@ -22,7 +22,7 @@ from benchmarks.hard_goals.problems import FAMILIES, Texts
 from benchmarks.measuring import machine, table
 
 from nondum.host.mind.extension import GROUP
-from nondum.host.mind.planner_process import PlannerProcess
+from nondum.host.mind.planner_process import PlannerProcess, planner_forks
 from nondum.host.mind.planners import Planners
 from nondum.planning.ground.bounds import INSTANCES_LIMIT
 from nondum.planning.ground.ground import ground
@@ -67,8 +67,9 @@ async def _asked(limit_s: float, only: str | None) -> list[Row]:
     from importlib_metadata import entry_points
 
     found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
-    processes = [PlannerProcess(n, found[n], memory_mb=MEMORY_MB) for n in sorted(found)]
-    planners = Planners(processes)
+    forks = planner_forks()
+    processes = [PlannerProcess(n, found[n], forks, memory_mb=MEMORY_MB) for n in sorted(found)]
+    planners = Planners(processes, forks)
     await planners.warm()
     rows = []
     try:

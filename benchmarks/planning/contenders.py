@@ -62,14 +62,13 @@ def portfolio(domain: Path, problem: Path, clock: Clock) -> Answer:
     from importlib_metadata import entry_points
 
     from nondum.host.mind.extension import GROUP
-    from nondum.host.mind.planner_process import PlannerProcess
     from nondum.host.mind.planners import Planners
 
     found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
-    shipped = [name for name in ("native", "pyperplan") if name in found]
+    shipped = {name: found[name] for name in ("native", "pyperplan") if name in found}
 
     async def search(task: Any) -> Any:
-        planners = Planners([PlannerProcess(n, found[n], memory_mb=MEMORY_MB) for n in shipped])
+        planners = Planners.of(shipped, memory_mb=MEMORY_MB)
         try:
             return (await planners.plan(task, clock.left_s)).answer
         finally:

@@ -18,6 +18,7 @@ from tests.kit.command_line import (
     in_new_interpreter,
     nondum,
 )
+from tests.kit.descendants import descendants
 from tests.kit.endless_problem import ENDLESS, endless
 from tests.kit.golden import Golden
 from tests.kit.until import PATIENCE_S, until
@@ -187,26 +188,18 @@ def test_ctrl_c_ends_a_search_in_silence_and_leaves_no_process_behind(files: Pat
         text=True,
         env=clean_environment(),
     )
-    planners = children_of(process.pid)
+    planners = until("a search", lambda: searching(process.pid))
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=PATIENCE_S) == ("", "")
     assert process.returncode == 130
     assert not [pid for pid in planners if Path(f"/proc/{pid}").exists()]
 
 
-def children_of(pid: int) -> list[int]:
-    """Its children, once there are some that have come to themselves."""
-
-    def look() -> list[int]:
-        listed = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-        are_started = all("planner_child" in cmdline(int(child)) for child in listed)
-        return [int(child) for child in listed] if are_started else []
-
-    return until("children that have started", look)
-
-
-def cmdline(pid: int) -> str:
-    return Path(f"/proc/{pid}/cmdline").read_bytes().decode()
+def searching(pid: int) -> set[int]:
+    """The processes that plan for a command, once a fork server has made some."""
+    found = descendants(pid)
+    listed = [Path(f"/proc/{child}/cmdline").read_bytes() for child in found]
+    return found if sum(b"planner_child" in line for line in listed) > 1 else set()
 
 
 def test_a_long_search_is_shown_at_a_terminal(files: Path) -> None:

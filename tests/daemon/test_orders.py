@@ -23,6 +23,7 @@ def test_halt_now_needs_no_planner(host: RunningHost) -> None:
     host.bring("talk", talker())
     goal = host.want("(written spot)")
     host.until_goal(goal, "holds")
+    assert planners(host)
     for planner in planners(host):
         os.kill(planner, signal.SIGSTOP)
     host.bring("arm", arm())
@@ -96,9 +97,15 @@ def bearing(host: RunningHost, target: str) -> tuple[float, ...]:
 
 
 def planners(host: RunningHost) -> list[int]:
-    """The processes that search for plans."""
+    """The processes that search for plans: those that their fork server has made."""
     found = {pid: Path(f"/proc/{pid}/cmdline").read_text() for pid in descendants(host.pid)}
-    return [pid for pid, command in found.items() if "planner_child" in command]
+    (server,) = (pid for pid in children_of(host.pid) if "planner_child" in found[pid])
+    return children_of(server)
+
+
+def children_of(pid: int) -> list[int]:
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(child) for child in listed.split()]
 
 
 def any_stream(view: Row) -> bool:

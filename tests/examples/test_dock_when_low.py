@@ -12,7 +12,6 @@ from tests.host.mind.conftest import NATIVE, at_work
 from tests.host.mind.robot import Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import load_system_tree
 from nondum.sdk.plugin import describe, load
@@ -36,8 +35,10 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 async def test_low_battery_interrupts_the_goal_until_the_robot_has_docked() -> None:
-    native = PlannerProcess("native", NATIVE, memory_mb=512)
-    robot = Robot(Planners([native]), system_tree=load_system_tree("dock_when_low:tree"))
+    robot = Robot(
+        Planners.of({"native": NATIVE}, memory_mb=512),
+        system_tree=load_system_tree("dock_when_low:tree"),
+    )
     async with at_work(robot):
         robot.plug(
             COMPTON_CAMERA, PAN_TILT_UNIT, describe(load("charger.plugin:Charger", "charger"))

@@ -34,7 +34,7 @@ from tests.kit.evidence import logged
 
 from nondum.cli.installed_commands import installed_commands
 from nondum.cli.root import COMMANDS
-from nondum.host.jobs.fork_server import ANSWER_BYTES, answer, ask, serve
+from nondum.host.forking.fork_server import ANSWER_BYTES, answer, ask, serve
 from nondum.host.service.malloc import keep_what_is_loaded
 
 ROOT = Path(__file__).parent.parent.parent

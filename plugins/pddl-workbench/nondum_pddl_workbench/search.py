@@ -148,7 +148,6 @@ def _planners(limits: Limits) -> Planners:
     from importlib_metadata import entry_points
 
     from nondum.host.mind.extension import GROUP
-    from nondum.host.mind.planner_process import PlannerProcess
     from nondum.host.mind.planners import Planners
 
     found = {entry.name: entry.value for entry in entry_points(group=GROUP)}
@@ -156,7 +155,7 @@ def _planners(limits: Limits) -> Planners:
         message = f"no planner {limits.planner!r} is installed, only {', '.join(sorted(found))}"
         raise click.BadParameter(message, param_hint="--planner")
     asked = sorted(found) if limits.planner is None else [limits.planner]
-    return Planners([PlannerProcess(n, found[n], memory_mb=limits.memory_mb) for n in asked])
+    return Planners.of({name: found[name] for name in asked}, memory_mb=limits.memory_mb)
 
 
 def _outcome(answer: Answer, task: GroundTask, planner: str) -> Outcome:

@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager
 import pytest
 from tests.host.mind.robot import Robot
 
-from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import Planners
 
 NATIVE = "nondum.host.mind.native_planner:NativePlanner"
@@ -19,7 +18,7 @@ NATIVE = "nondum.host.mind.native_planner:NativePlanner"
 async def robot() -> AsyncIterator[Robot]:
     """Nothing is plugged in yet; the host's own planner plans. Of several, whichever is first wins:
     that is for test_planners and for whole daemons."""
-    async with at_work(Robot(Planners([PlannerProcess("native", NATIVE, memory_mb=512)]))) as robot:
+    async with at_work(Robot(Planners.of({"native": NATIVE}, memory_mb=512))) as robot:
         yield robot
 
 

@@ -13,7 +13,6 @@ from tests.host.mind.robot import Robot
 from tests.kit.clock import VirtualClock
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
-from nondum.host.mind.planner_process import PlannerProcess
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.system_tree import Parts, default_tree
 from nondum.planning.execute.running import LEASE_S
@@ -51,8 +50,7 @@ class Guarded:
 
 
 def guarded_robot(guarded: Guarded) -> Robot:
-    native = PlannerProcess("native", NATIVE, memory_mb=512)
-    robot = Robot(Planners([native]), system_tree=guarded.tree)
+    robot = Robot(Planners.of({"native": NATIVE}, memory_mb=512), system_tree=guarded.tree)
     robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
     return robot
 
@@ -130,8 +128,9 @@ async def test_behaviours_of_a_task_that_is_no_longer_ticked_are_halted(
         above.append(Asleep(parts.task))
         return default_tree(replace(parts, task=above[0]))
 
-    native = PlannerProcess("native", NATIVE, memory_mb=512)
-    async with at_work(Robot(Planners([native]), system_tree=tree)) as robot:
+    async with at_work(
+        Robot(Planners.of({"native": NATIVE}, memory_mb=512), system_tree=tree)
+    ) as robot:
         robot.plug(COMPTON_CAMERA, PAN_TILT_UNIT)
         robot.mind.give(pddl=POINT, kind="maintain")
         await clock.advance_until(robot.until_holding())

@@ -1,4 +1,4 @@
-"""Planner processes: warm, bounded, and believed only after a check."""
+"""Planner processes: begun at once, bounded, and believed only after a check."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 from tests.kit.clock import VirtualClock
 from tests.kit.descriptors import descriptors_left
+from tests.kit.processes import is_alive, process_ended
 from tests.kit.until import arrived, until_async
 from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
-from nondum.host.mind.planner_process import PlannerProcess
+from nondum.host.mind.planner_process import QUIET_S, PlannerProcess, planner_forks
 from nondum.host.mind.planner_wire import Request
 from nondum.host.mind.planners import Planners
 from nondum.sdk.errors import PlannerFailed
@@ -68,9 +69,20 @@ class Spender(Planner):
 class Reader(Planner):
     speaks = "pddl"
     def plan(self, task, deadline_s): return PlanText(tuple(task.problem.split(",")))
+class Importer(Planner):
+    imported_by = os.getpid()
+    def plan(self, task, deadline_s):
+        return GaveUp({os.getpid(): "its process", os.getppid(): "the server"}[self.imported_by])
 class Sceptic(Planner):
     speaks = "pddl"
     def plan(self, task, deadline_s): return Unsolvable("relaxed")
+"""
+
+THREADED = """
+import os, sham, threading, time
+threading.Thread(target=time.sleep, args=(3600,), daemon=True).start()
+class Importer(sham.Importer):
+    imported_by = os.getpid()
 """
 
 REFERENCES = {
@@ -85,23 +97,21 @@ Make = Callable[[str], PlannerProcess]
 async def planner(tmp_path: Path) -> AsyncIterator[Make]:
     """Makes planner processes, also of planners that misbehave."""
     (tmp_path / "sham.py").write_text(SHAM)
+    (tmp_path / "threaded.py").write_text(THREADED)
     paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     made: list[PlannerProcess] = []
+    forks = planner_forks({"PYTHONPATH": os.pathsep.join(paths)})
 
     def make(name: str) -> PlannerProcess:
-        environment = {"PYTHONPATH": os.pathsep.join(paths)}
-        reference = REFERENCES.get(name, f"sham:{name.capitalize()}")
+        reference = REFERENCES.get(name, name if ":" in name else f"sham:{name.capitalize()}")
         folder = tmp_path / "planning"
-        made.append(
-            PlannerProcess(
-                name, reference, memory_mb=512, environment=environment, temporary=folder
-            )
-        )
+        made.append(PlannerProcess(name, reference, forks, memory_mb=512, temporary=folder))
         return made[-1]
 
     yield make
     for process in made:
         await process.close()
+    await forks.close()
 
 
 @pytest.fixture
@@ -125,13 +135,30 @@ async def test_native_planner_is_installed_with_the_host(task: GroundTask) -> No
         await planners.close()
 
 
-async def test_child_stays_warm(planner: Make, task: GroundTask) -> None:
+async def test_child_stays_for_the_next_task_and_ends_without_one(
+    planner: Make, task: GroundTask, clock: VirtualClock
+) -> None:
     process = planner("pyperplan")
-    await process.warm()
-    pid = process.pid
     await process.plan(Request(task), 5.0)
+    pid = process.pid
+    await clock.advance(0.9 * QUIET_S)
     await process.plan(Request(task), 5.0)
     assert process.pid == pid is not None
+    await clock.advance(0.9 * QUIET_S)
+    assert process.pid == pid
+    with process_ended(pid) as ended:
+        await clock.advance(0.2 * QUIET_S)
+        await ended.wait()
+    assert isinstance(await process.plan(Request(task), 5.0), Plan)
+
+
+@pytest.mark.parametrize(("name", "who"), [("sham", "the server"), ("threaded", "its process")])
+async def test_planner_is_imported_by_the_fork_server_where_that_leaves_it_fit_to_fork(
+    planner: Make, task: GroundTask, name: str, who: str
+) -> None:
+    process = planner(f"{name}:Importer")
+    await process.warm()
+    assert await process.plan(Request(task), 5.0) == GaveUp(who)
 
 
 async def test_true_goal_needs_no_planner(planner: Make, task: GroundTask) -> None:
@@ -191,25 +218,27 @@ async def test_what_a_planner_had_written_goes_when_it_is_killed(
     assert not folder.exists()
 
 
-async def test_start_that_is_cancelled_leaves_nothing(planner: Make, tmp_path: Path) -> None:
-    process = planner("native")
-    await cancelled_in_the_midst_of_making_its_folder(process, tmp_path / "planning/native")
+async def test_start_that_is_cancelled_leaves_nothing(
+    planner: Make, task: GroundTask, tmp_path: Path
+) -> None:
+    process, folder = planner("native"), tmp_path / "planning/native"
+    await cancelled_in_the_midst_of_making_its_folder(process, task, folder)
     await process.close()
     assert not (await asyncio.to_thread(list, (tmp_path / "planning").iterdir()))
 
 
 async def test_start_after_one_that_was_cancelled_has_its_folder(
-    planner: Make, tmp_path: Path
+    planner: Make, task: GroundTask, tmp_path: Path
 ) -> None:
-    process, folder = planner("writer"), tmp_path / "planning/writer"
-    await cancelled_in_the_midst_of_making_its_folder(process, folder)
-    await process.warm()
+    process, folder = planner("native"), tmp_path / "planning/native"
+    await cancelled_in_the_midst_of_making_its_folder(process, task, folder)
+    await process.plan(Request(task), 5.0)
     assert await asyncio.to_thread(folder.is_dir)
     assert not await asyncio.to_thread(list, folder.glob("left-*"))
 
 
 async def cancelled_in_the_midst_of_making_its_folder(
-    process: PlannerProcess, folder: Path
+    process: PlannerProcess, task: GroundTask, folder: Path
 ) -> None:
     """Cancel a start while it removes what a planner before has left."""
 
@@ -222,7 +251,7 @@ async def cancelled_in_the_midst_of_making_its_folder(
         return sum(1 for _ in folder.iterdir()) == 2_000
 
     await asyncio.to_thread(leave_much)
-    starting = asyncio.create_task(process.warm())
+    starting = asyncio.create_task(process.plan(Request(task), 5.0))
     while is_untouched():  # noqa: ASYNC110  # nothing tells of it
         await asyncio.sleep(0)
     starting.cancel()
@@ -230,12 +259,12 @@ async def cancelled_in_the_midst_of_making_its_folder(
 
 
 async def test_what_the_planner_of_a_killed_daemon_had_written_goes(
-    planner: Make, tmp_path: Path
+    planner: Make, task: GroundTask, tmp_path: Path
 ) -> None:
-    (tmp_path / "planning/writer").mkdir(parents=True)
-    (tmp_path / "planning/writer/output.sas").write_text("searched")
-    await planner("writer").warm()
-    assert not any((tmp_path / "planning/writer").iterdir())
+    (tmp_path / "planning/native").mkdir(parents=True)
+    (tmp_path / "planning/native/output.sas").write_text("searched")
+    await planner("native").plan(Request(task), 5.0)
+    assert not any((tmp_path / "planning/native").iterdir())
 
 
 async def test_planner_works_where_no_folder_can_be_made(
@@ -249,8 +278,8 @@ async def test_planner_for_which_no_descriptor_is_left_leaves_the_search_to_anot
     planner: Make, task: GroundTask, tmp_path: Path
 ) -> None:
     others, late = planner("native"), planner("pyperplan")
-    await others.warm()
-    with descriptors_left(2):  # its pipes take more
+    await others.plan(Request(task), 5.0)
+    with descriptors_left(2):  # its socket and pipe take more
         await Planners([late]).warm()
         alone = await Planners([late]).plan(task, 5.0)
         found = await Planners([others, late]).plan(task, 5.0)
@@ -367,7 +396,7 @@ async def test_text_planner_gives_up_without_text(planner: Make, task: GroundTas
 
 async def test_killed_planner_comes_back(planner: Make, task: GroundTask) -> None:
     process = planner("pyperplan")
-    await process.warm()
+    await process.plan(Request(task), 5.0)
     assert process.pid is not None
     os.kill(process.pid, 9)
     with pytest.raises(PlannerFailed):
@@ -377,34 +406,26 @@ async def test_killed_planner_comes_back(planner: Make, task: GroundTask) -> Non
 
 async def test_cancelling_kills_the_search(planner: Make, task: GroundTask) -> None:
     process = planner("hanger")
-    await process.warm()
-    pid = process.pid
     search = asyncio.create_task(process.plan(Request(task), 60.0))
-    await asyncio.sleep(0)
+    pid = await until_async("its process", lambda: process.pid or 0)
     search.cancel()
     with pytest.raises(asyncio.CancelledError):
         await search
-    assert pid is not None
     assert process.pid is None
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
+    assert not is_alive(pid)
 
 
 async def test_unreaped_child_is_reaped_at_last(planner: Make, task: GroundTask) -> None:
     process = planner("hanger")
-    await process.warm()
-    pid = process.pid
     search = asyncio.create_task(process.plan(Request(task), 60.0))
-    await asyncio.sleep(0)
+    pid = await until_async("its process", lambda: process.pid or 0)
     search.cancel()
     await asyncio.sleep(0)
     search.cancel()  # while it waits for the child that the first one killed
     with pytest.raises(asyncio.CancelledError):
         await search
     await process.close()
-    assert pid is not None
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
+    assert not is_alive(pid)
 
 
 async def test_follow_plan_is_the_only_one(planner: Make) -> None:

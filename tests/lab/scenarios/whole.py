@@ -30,7 +30,7 @@ def _at(lab: Lab, level: Level) -> str:
     _see_granted(host)
     machine.run(f'nondum goal --maintain --pddl "{GOAL}"')
     host.until_goal(GOAL, "holds")
-    machine.run("pgrep -u nondum -f planner_child")  # who planned it is kept
+    machine.run("pgrep -u nondum -f planner_child")  # their fork server is kept
     machine.pull_line(line)
     host.until_component("gauge", "waits for gauge")
     host.until_goal(GOAL, "suspended")

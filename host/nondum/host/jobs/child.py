@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.brief import brief
-from nondum.host.jobs import fork_server, table
+from nondum.host.forking import fork_server
+from nondum.host.jobs import table
 from nondum.host.jobs.allowance import allowed, confine_process
 from nondum.host.jobs.table import LONGEST, PROGRESS, Arguments, Progress, Report
 from nondum.host.rpc.channel import Channel, Tell, conversation

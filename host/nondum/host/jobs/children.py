@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nondum.host.jobs.fork_client import ForkClient, Forked
+from nondum.host.forking.fork_client import ForkClient, Forked
 from nondum.host.jobs.table import LONGEST, PROGRESS, Progress
 from nondum.host.rpc.child_link import ChildLink
 from nondum.host.rpc.outcomes import unpacked

@@ -19,10 +19,10 @@ class PlannerFolder:
         self._parent = parent
         self._path: Path | None = None
 
-    def make(self) -> dict[str, str]:
-        """Make it empty, and return the environment variables that name it.
+    def make(self) -> str:
+        """Make it empty, and return where it is.
 
-        There are none where it cannot be made: most planners need no files, and a disk may be full.
+        It is nowhere if it cannot be made: most planners need no files, and a disk may be full.
         """
         self.remove()
         try:
@@ -34,8 +34,8 @@ class PlannerFolder:
                 self._path.mkdir(mode=0o700, parents=True)
         except OSError as error:
             log.warning("planner %s has no folder for its files: %s", self._name, error)
-            return {}
-        return {"TMPDIR": str(self._path)}
+            return ""
+        return str(self._path)
 
     def remove(self) -> None:
         """Remove it with all that is in it."""

@@ -1,31 +1,30 @@
-"""One planner in a separate process: kept warm, killed when it overruns or is not wanted."""
+"""One planner in a separate process: killed when it overruns, is not wanted, or has had no task for
+a while."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
-import os
-import signal
-import sys
 import time
-from asyncio.subprocess import DEVNULL, Process
 from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from nondum.host.forking.fork_client import ForkClient, Forked
 from nondum.host.mind import planner_wire as wire
+from nondum.host.mind.planner_child import start_of
 from nondum.host.mind.planner_folder import PlannerFolder
 from nondum.host.rpc.child_link import ChildLink
 from nondum.host.rpc.outcomes import unpacked
 from nondum.sdk.errors import LinkClosed, NondumError, PlannerFailed, Problem
 from nondum.sdk.planner import Answer, GaveUp, PlanText
-from nondum.transport import link_sockets
 
 START_S = 60.0
 """How long a planner may take to load: on a small computer that is just starting, a while."""
 GRACE_S = 0.5
 """How much longer than its deadline a planner may take before it is killed."""
+QUIET_S = 30.0
+"""Without a task for so long, there is no process."""
 AT_ONCE = 2_000
 """Ground actions that are written for the wire in a time that the loop can spare."""
 _LANGUAGES = ("ground", "pddl")
@@ -35,6 +34,14 @@ log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
 
+def planner_forks(environment: Mapping[str, str] | None = None) -> ForkClient:
+    """The fork server of planners, with `environment` added to that of this process. Close it."""
+    return ForkClient(
+        "nondum.host.mind.planner_child",
+        environment={"PYTHONHASHSEED": "0", **(environment or {})},
+    )
+
+
 class PlannerProcess:
     """Serves one task at a time. Close it when done."""
 
@@ -42,21 +49,23 @@ class PlannerProcess:
         self,
         name: str,
         reference: str,
+        forks: ForkClient,
         *,
         memory_mb: int,
-        environment: Mapping[str, str] | None = None,
         temporary: Path | None = None,
     ) -> None:
         """`reference` (`module:class`) is what entry point `name` in group `nondum.planners` names.
-        The child's environment is that of this process, with `environment` added. Its temporary
-        files are in a folder below `temporary`, or where this machine has such."""
+        The child's temporary files are in a folder below `temporary`, or where this machine has
+        such."""
         self.name = name
-        self._reference = reference
-        self._memory_mb = memory_mb
+        self._reference, self._memory_mb = reference, memory_mb
+        self._forks = forks
         self._folder = PlannerFolder(name, temporary)
-        self._environment = {**os.environ, "PYTHONHASHSEED": "0", **(environment or {})}
-        self._process: Process | None = None
+        self._process: Forked | None = None
         self._link: ChildLink | None = None
+        self._resting: asyncio.TimerHandle | None = None
+        self._ending: asyncio.Future[None] | None = None
+        """Kept, since a loop keeps no tasks."""
         self._going: set[asyncio.Future[Any]] = set()
         """Tasks that outlive a cancelled caller; `close` waits for them."""
         self._language = ""
@@ -69,9 +78,8 @@ class PlannerProcess:
         return self._process.pid if self._process else None
 
     async def warm(self) -> None:
-        """Start the child, so that the first task need not wait. Raises `PlannerFailed`."""
-        async with self._lock:
-            await self._running()
+        """Have the planner imported, so that the first task need not wait for that."""
+        await self._forks.expect(start_of(self._reference, self._memory_mb))
 
     async def plan(self, request: wire.Request, deadline_s: float) -> Answer | PlanText:
         """Ask for a plan, if the planner is one for such tasks. Being cancelled kills the child.
@@ -79,6 +87,7 @@ class PlannerProcess:
         Raises `PlannerFailed` (PLANNER_START, PLANNER_DIED, PLANNER_ANSWER, PLANNER_RAISED).
         """
         async with self._lock:
+            self._wake()
             try:
                 link = await self._running()
                 if reason := self._refusal(request):
@@ -92,15 +101,32 @@ class PlannerProcess:
                 if not isinstance(error, PlannerFailed) or error.code != "PLANNER_RAISED":
                     await self._kill()
                 raise
+            finally:
+                self._resting = asyncio.get_running_loop().call_later(QUIET_S, self._rest)
 
     async def close(self) -> None:
         """End the child, and with it a search that is under way."""
         if self._process is not None:
-            _end(self._process)
+            self._process.kill_all()
         async with self._lock:
+            self._wake()
             await self._kill()
             # Behind whatever outlives a cancelled caller: a start may just have made the folder.
             await self._to_its_end(asyncio.to_thread(self._folder.remove))
+
+    def _wake(self) -> None:
+        if self._resting is not None:
+            self._resting.cancel()
+            self._resting = None
+
+    def _rest(self) -> None:
+        self._ending = asyncio.ensure_future(self._end_at_rest())
+
+    async def _end_at_rest(self) -> None:
+        async with self._lock:
+            now_s = asyncio.get_running_loop().time()
+            if self._resting is not None and self._resting.when() <= now_s:
+                await self._kill()
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""
@@ -143,28 +169,13 @@ class PlannerProcess:
                 raise self._failure("PLANNER_START", f"it speaks no language of this host: {told}")
         return self._link
 
-    async def _started(self, folder: Mapping[str, str]) -> ChildLink:
+    async def _started(self, folder: str) -> ChildLink:
         """Start the child. Where this host has no process or descriptor left, others may plan."""
-        module = "nondum.host.mind.planner_child"
+        start = start_of(self._reference, self._memory_mb, folder)
         try:
-            with contextlib.ExitStack() as failed:
-                ours, theirs = link_sockets()
-                failed.callback(ours.close)
-                with theirs:
-                    self._process = await asyncio.create_subprocess_exec(
-                        *(sys.executable, "-P", "-m", module, self._reference),
-                        *(str(self._memory_mb), str(os.getpid())),
-                        stdin=theirs.fileno(),
-                        stdout=DEVNULL,
-                        stderr=DEVNULL,
-                        env={**self._environment, **folder},
-                        start_new_session=True,
-                        cwd="/",
-                    )
-                link = ChildLink(ours, wire.MAX_BYTES)
-                failed.pop_all()
-            return link
-        except OSError as error:
+            self._process = await self._forks.fork(start, START_S)
+            return ChildLink(self._process.conversation, wire.MAX_BYTES)
+        except (OSError, EOFError) as error:
             log.warning("planner %s cannot be started: %s", self.name, error)
             await self._kill()
             await self._to_its_end(asyncio.to_thread(self._folder.remove))
@@ -187,8 +198,9 @@ class PlannerProcess:
         process, self._process, self._language = self._process, None, ""
         if process is None:
             return
-        _end(process)
-        await self._to_its_end(process.wait())
+        process.kill_all()
+        await self._to_its_end(process.over())
+        process.close()
         await self._to_its_end(asyncio.to_thread(self._folder.remove))
 
     async def _to_its_end(self, awaited: Coroutine[Any, Any, _T]) -> _T:
@@ -206,10 +218,3 @@ async def _after(others: frozenset[asyncio.Future[Any]], awaited: Coroutine[Any,
     if others:
         await asyncio.wait(others)
     return await awaited
-
-
-def _end(process: Process) -> None:
-    """Kill a child and all that it started; `Process.kill` might reap it behind asyncio's back."""
-    if process.returncode is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)

@@ -14,8 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from nondum.host.forking.fork_client import ForkClient
 from nondum.host.mind.extension import planners
-from nondum.host.mind.planner_process import PlannerProcess
+from nondum.host.mind.planner_process import PlannerProcess, planner_forks
 from nondum.host.mind.planner_wire import Request, TaskText
 from nondum.planning.ground.delete_relaxation import quick_answer
 from nondum.planning.ground.plan_text import plan_of
@@ -53,8 +54,11 @@ class Found:
 class Planners:
     """A portfolio of planner processes. Asks them all; close it when done."""
 
-    def __init__(self, processes: Sequence[PlannerProcess]) -> None:
-        self._processes = tuple(processes)
+    def __init__(
+        self, processes: Sequence[PlannerProcess], forks: ForkClient | None = None
+    ) -> None:
+        """`forks`, where the processes come from, is closed with them if it is given."""
+        self._processes, self._forks = tuple(processes), forks
 
     @classmethod
     def installed(cls, *, memory_mb: int, temporary: Path | None = None) -> Planners:
@@ -66,12 +70,12 @@ class Planners:
         cls, found: Mapping[str, str], *, memory_mb: int, temporary: Path | None = None
     ) -> Planners:
         """Planners by name: `module:Class`."""
-        return cls(
-            [
-                PlannerProcess(name, found[name], memory_mb=memory_mb, temporary=temporary)
-                for name in sorted(found)
-            ]
-        )
+        forks = planner_forks()
+        processes = [
+            PlannerProcess(name, found[name], forks, memory_mb=memory_mb, temporary=temporary)
+            for name in sorted(found)
+        ]
+        return cls(processes, forks)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -79,15 +83,9 @@ class Planners:
         return tuple(process.name for process in self._processes)
 
     async def warm(self) -> None:
-        """Start every child. One that does not start is logged, and tried again when needed."""
-        results = await asyncio.gather(
-            *(process.warm() for process in self._processes), return_exceptions=True
-        )
-        for result in results:
-            if isinstance(result, PlannerFailed):
-                log.warning("%s", result)
-            elif isinstance(result, BaseException):
-                raise result
+        """Have every planner imported, one after the other."""
+        for process in self._processes:
+            await process.warm()
 
     async def plan(
         self, task: GroundTask, deadline_s: float, text: TaskText | None = None
@@ -118,6 +116,8 @@ class Planners:
     async def close(self) -> None:
         """End every child."""
         await asyncio.gather(*(process.close() for process in self._processes))
+        if self._forks is not None:
+            await self._forks.close()
 
 
 _Search: TypeAlias = asyncio.Task[Answer | PlanText]

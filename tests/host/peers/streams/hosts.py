@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator, Callable
 
 import numpy as np
 
+from nondum.host.forking.fork_client import ForkClient
 from nondum.host.jobs.children import Children
-from nondum.host.jobs.fork_client import ForkClient
 from nondum.host.peers.streams.bridge import Bridge, Grant
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.messages import Header, Image, Message

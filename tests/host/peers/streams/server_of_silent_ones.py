@@ -6,7 +6,7 @@ import os
 import socket
 import sys
 
-from nondum.host.jobs import fork_server
+from nondum.host.forking import fork_server
 
 if __name__ == "__main__":
     if fork_server.serve(socket.socket(fileno=int(sys.argv[2]))):

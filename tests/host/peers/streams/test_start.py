@@ -15,7 +15,7 @@ from tests.kit.clock import VirtualClock
 from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
-from nondum.host.jobs.fork_client import ForkClient
+from nondum.host.forking.fork_client import ForkClient
 from nondum.host.peers.streams import process
 from nondum.host.peers.streams.bridge import FORK_S, START_S, Bridge
 from nondum.host.sandbox.levels import refusals

@@ -14,7 +14,7 @@ import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
-from nondum.host.jobs.fork_client import ForkClient, Forked
+from nondum.host.forking.fork_client import ForkClient, Forked
 from nondum.sdk.errors import LinkClosed, NondumError, Problem, ProtocolViolation, WorkerFailed
 from nondum.sdk.frozen import frozen
 from nondum.sdk.wire_fields import read_problem

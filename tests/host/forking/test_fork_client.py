@@ -20,9 +20,9 @@ from tests.kit.processes import process_ended
 from tests.kit.until import arrived, until_async
 from tests.kit.watches import watches_left
 
-from nondum.host.jobs import fork_server
+from nondum.host.forking import fork_server
+from nondum.host.forking.fork_client import ForkClient
 from nondum.host.jobs.children import START_S, Children
-from nondum.host.jobs.fork_client import ForkClient
 from nondum.sdk.errors import InstallFailed
 
 pytestmark = pytest.mark.anyio
@@ -92,7 +92,7 @@ async def test_killed_server_is_started_again_with_a_warning(
         with caplog.at_level(logging.WARNING):
             second = await client.fork(JOB, START_S)
         assert server_of(client) != former
-        assert [record.name for record in caplog.records] == ["nondum.host.jobs.fork_client"]
+        assert [record.name for record in caplog.records] == ["nondum.host.forking.fork_client"]
         os.kill(second.pid, 0)
         first.close()
         second.close()
@@ -165,7 +165,7 @@ async def test_server_that_cannot_fork_says_why_and_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    async with fork_client("tests.host.jobs.server_that_cannot_fork") as client:
+    async with fork_client("tests.host.forking.server_that_cannot_fork") as client:
         with pytest.raises(OSError) as first:
             await client.fork(JOB, START_S)
         assert first.value.errno == errno.EAGAIN
@@ -181,7 +181,7 @@ async def test_server_that_may_not_send_yet_is_asked_again(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     refusals: list[None] = []
-    module = "tests.host.jobs.server_that_may_not_send"
+    module = "tests.host.forking.server_that_may_not_send"
     async with fork_client(module, lambda: refusals.append(None)) as client:
         forked = await client.fork(JOB, START_S)
         assert len(refusals) == 1

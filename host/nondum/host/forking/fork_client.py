@@ -11,9 +11,10 @@ import signal
 import socket
 import sys
 from asyncio.subprocess import DEVNULL, Process
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 
-from nondum.host.jobs import fork_server
+from nondum.host.forking import fork_server
 from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 END_S = 1.0
@@ -49,6 +50,13 @@ class Forked:
         """SIGKILL it, if it runs."""
         if self._status >= 0:
             _kill(self._descriptor)
+
+    def kill_all(self) -> None:
+        """SIGKILL it, and what it has started, if it leads a session."""
+        if self._status >= 0:
+            self.kill()
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.pid, signal.SIGKILL)
 
     @property
     def is_over(self) -> bool:
@@ -94,11 +102,19 @@ class Forked:
 class ForkClient:
     """Starts the fork server when it is first needed, and again when it has ended. `close` it."""
 
-    def __init__(self, module: str, on_crowded: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        module: str,
+        on_crowded: Callable[[], None] = lambda: None,
+        *,
+        environment: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         """`module` is run as a program with this process's id and the descriptor of its end of the
-        channel (`fork_server.serve`). `on_crowded` is called when descriptors cannot be sent yet
-        since too many of this user's are under way (ETOOMANYREFS, unix(7)): that is tried again."""
+        channel (`fork_server.serve`), with `environment` added to that of this
+        process. `on_crowded` is called when descriptors cannot be sent yet since too many of this
+        user's are under way (ETOOMANYREFS, unix(7)): that is tried again."""
         self._module, self._on_crowded = module, on_crowded
+        self._environment = environment
         self._server: Process | None = None
         self._channel: socket.socket | None = None
         self._expected: list[str] = []
@@ -175,6 +191,7 @@ class ForkClient:
                     stdin=DEVNULL,
                     stdout=DEVNULL,
                     pass_fds=(theirs.fileno(),),
+                    env={**os.environ, **self._environment},
                     start_new_session=True,
                     cwd="/",
                 )

@@ -7,7 +7,7 @@ import resource
 import socket
 import sys
 
-from nondum.host.jobs import fork_server
+from nondum.host.forking import fork_server
 
 UNPRIVILEGED = 65534
 
