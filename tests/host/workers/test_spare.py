@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from tests.host.workers.trees import CountedTree
 from tests.kit.processes import is_alive, until_gone
-from tests.kit.until import PATIENCE_S
+from tests.kit.until import PATIENCE_S, until_async
 from tests.kit.workers import SDK, WorkersUnderTest
 
 from nondum.host.sandbox.cgroups.groups import Cgroups, NoTree
@@ -238,12 +238,11 @@ async def test_start_that_is_not_wanted_any_more_leaves_no_process(
     launcher = WorkerLauncher(tested.confinement, Cgroups(tree), tested.folder)
     warming = asyncio.create_task(launcher.warm())
     await asyncio.to_thread(tree.is_asked.wait, PATIENCE_S)
-    processes = spares(tested.folder)
+    processes = await until_async("an environment to know it by", lambda: spares(tested.folder))
     warming.cancel()
     tree.may_go_on.set()
     await asyncio.wait([warming])
     assert warming.cancelled()
-    assert processes
     for process in processes:
         await until_gone(process)
     assert launcher.spare_pid is None
