@@ -35,6 +35,8 @@ pytestmark = pytest.mark.anyio
 
 SHAM = """
 import os, tempfile, time
+from pathlib import Path
+with Path(__file__).with_name("imported").open("a") as imported: print(os.getpid(), file=imported)
 from nondum.sdk.planner import AlreadyTrue, GaveUp, Plan, PlanText, Unsolvable
 class Planner:
     speaks = "ground"
@@ -97,6 +99,7 @@ Make = Callable[[str], PlannerProcess]
 async def planner(tmp_path: Path) -> AsyncIterator[Make]:
     """Makes planner processes, also of planners that misbehave."""
     (tmp_path / "sham.py").write_text(SHAM)
+    (tmp_path / "imported").touch()
     (tmp_path / "threaded.py").write_text(THREADED)
     paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
     made: list[PlannerProcess] = []
@@ -152,12 +155,16 @@ async def test_child_stays_for_the_next_task_and_ends_without_one(
     assert isinstance(await process.plan(Request(task), 5.0), Plan)
 
 
-@pytest.mark.parametrize(("name", "who"), [("sham", "the server"), ("threaded", "its process")])
+@pytest.mark.parametrize(
+    ("name", "imports", "who"),
+    [("sham", 2, "the server"), ("threaded", 1, "its process")],  # one is the server's trial
+)
 async def test_planner_is_imported_by_the_fork_server_where_that_leaves_it_fit_to_fork(
-    planner: Make, task: GroundTask, name: str, who: str
+    planner: Make, task: GroundTask, tmp_path: Path, name: str, imports: int, who: str
 ) -> None:
-    process = planner(f"{name}:Importer")
+    process, imported = planner(f"{name}:Importer"), tmp_path / "imported"
     await process.warm()
+    await until_async("imports", lambda: len(imported.read_text().splitlines()) == imports)
     assert await process.plan(Request(task), 5.0) == GaveUp(who)
 
 

@@ -33,13 +33,16 @@ NICENESS = 10
 TRIAL_S = 20
 """How long a planner may take to be imported before the server leaves that to its process."""
 
-_prepared: set[str] = set()
 
-
-def start_of(reference: str, memory_mb: int, folder: str = "") -> str:
+def start_of(reference: str, memory_mb: int, folder: str) -> str:
     """Asks the server for the process of a planner (`module:class`), with a limit, and a folder for
-    its temporary files."""
+    its temporary files, if there is one."""
     return json.dumps([reference, memory_mb, folder])
+
+
+def expected(reference: str) -> str:
+    """Has the server import a planner."""
+    return json.dumps([reference])
 
 
 def main(daemon: int, channel: int) -> None:
@@ -62,11 +65,11 @@ def main(daemon: int, channel: int) -> None:
 
 
 def _prepare(asked: bytes) -> None:
-    """Import a planner, where that leaves the server fit to fork: once for all its processes."""
-    reference, *_ = json.loads(asked)
-    if reference in _prepared:
+    """Import a planner that is expected, where that leaves the server fit to fork; for a task that
+    waits, its process does so at once."""
+    reference, *wanted = json.loads(asked)
+    if wanted:
         return
-    _prepared.add(reference)
     trial = os.fork()
     if trial == 0:
         signal.alarm(TRIAL_S)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from nondum.host.forking.fork_client import ForkClient, Forked
 from nondum.host.mind import planner_wire as wire
-from nondum.host.mind.planner_child import start_of
+from nondum.host.mind.planner_child import expected, start_of
 from nondum.host.mind.planner_folder import PlannerFolder
 from nondum.host.rpc.child_link import ChildLink
 from nondum.host.rpc.outcomes import unpacked
@@ -79,7 +79,7 @@ class PlannerProcess:
 
     async def warm(self) -> None:
         """Have the planner imported, so that the first task need not wait for that."""
-        await self._forks.expect(start_of(self._reference, self._memory_mb))
+        await self._forks.expect(expected(self._reference))
 
     async def plan(self, request: wire.Request, deadline_s: float) -> Answer | PlanText:
         """Ask for a plan, if the planner is one for such tasks. Being cancelled kills the child.
