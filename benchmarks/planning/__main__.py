@@ -22,7 +22,8 @@ DISTRIBUTIONS = ("pyperplan", "up-fast-downward")
 def main() -> None:
     """Let everybody try everything, print the tables, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--domains", type=Path, required=True, help="folder of folders with PDDL")
+    folder = "folder of folders with PDDL, as `benchmarks.planning.draw` makes"
+    parser.add_argument("--domains", type=Path, required=True, help=folder)
     parser.add_argument("--limit", type=float, default=10.0, help="seconds a problem [10]")
     parser.add_argument("--out", type=Path, default=PAGE, help="the page to write")
     parser.add_argument("--jobs", type=int, default=1, help="problems at once [1]")

@@ -142,7 +142,7 @@ def _own_wheels(source: Path, folder: Path) -> None:
 
 
 def _requirement(wheel: Path) -> str:
-    """One of our own wheels, with its extras, as pip is told."""
+    """One of our own wheels, with its extras, as a requirement for pip."""
     name = wheel.name.partition("-")[0]
     return f"{name}[{EXTRAS[name]}]" if name in EXTRAS else name
 

@@ -36,7 +36,7 @@ def version() -> str:
 
 
 def declared() -> list[str]:
-    """What the distributions need, each other left out, as pip is told (PEP 508)."""
+    """The requirements of the distributions but each other, for pip (PEP 508)."""
     own = {str(project(place)["name"]) for place in DISTRIBUTIONS}
     wanted: list[str] = []
     for place in DISTRIBUTIONS:
@@ -49,7 +49,7 @@ def declared() -> list[str]:
 
 
 def declared_backend() -> list[str]:
-    """What building the distributions needs, as pip is told (PEP 518)."""
+    """The requirements for building the distributions, for pip (PEP 518)."""
     wanted: set[str] = set()
     for place in DISTRIBUTIONS:
         text = (CHECKOUT / place / "pyproject.toml").read_text(encoding="utf-8")

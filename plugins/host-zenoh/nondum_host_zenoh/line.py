@@ -229,7 +229,7 @@ class Line:
             try:
                 session: zenoh.Session = library.open(self._config)
             except library.ZError as error:
-                self._failure = str(error)
+                self._failure = str(error).partition(" at /")[0]  # a place in its source follows
                 with self._has_work:
                     self._has_work.wait(CONNECT_S)
                 continue

@@ -152,7 +152,8 @@ class ZenohNode:
             async with asyncio.timeout(START_S):
                 await self._line.opened.wait()
         except TimeoutError:
-            log.warning("%s", self.problem)
+            if self.problem is not None:
+                log.warning("%s", self.problem)
 
     def call(self, peer: PeerKey, method: str, args: Body, *, deadline_s: float) -> Call:
         """Call a peer. Raises `PeerUnreachable` and more, as `PeerNode.call`."""

@@ -76,7 +76,7 @@ class FleetMember:
     handler: Handler
     """Answers what peers call."""
     on_event: Callable[[FleetEvent], None]
-    """Is told of peers that come, change and go."""
+    """Called when a peer comes, changes or goes."""
     find: Find
     """Looks for hosts, where these are linked one by one."""
 
@@ -118,6 +118,6 @@ def fleets(config: HostConfig) -> Mapping[str, MakeFleet]:  # type: ignore[empty
 def config_keys() -> Iterable[str]:  # type: ignore[empty-body]  # a specification
     """Keys of the configuration that the extension acts on, such as `feedback.lamps`.
 
-    Of the keys that need an extension, each that is set and that no extension acts on is told in
-    every status (`EXTENSION_MISSING`).
+    Where a key is set that needs an extension, and no extension acts on it, every status warns of
+    it (`EXTENSION_MISSING`).
     """

@@ -113,6 +113,8 @@ class PlannerProcess:
             await self._kill()
             # Behind whatever outlives a cancelled caller: a start may just have made the folder.
             await self._to_its_end(asyncio.to_thread(self._folder.remove))
+        if self._ending is not None:
+            await self._ending
 
     def _wake(self) -> None:
         if self._resting is not None:
@@ -149,7 +151,7 @@ class PlannerProcess:
 
     async def _running(self) -> ChildLink:
         """The link to the child, which is started if there is none."""
-        is_there = self._process is not None and self._process.returncode is None
+        is_there = self._process is not None and not self._process.is_over
         if self._link is not None and is_there and self._language:
             return self._link
         await self._kill()

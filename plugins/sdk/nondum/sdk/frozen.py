@@ -55,10 +55,9 @@ class _Uncompiled:
     def __get__(self, instance: object, owner: type | None = None) -> Callable[..., Any]:
         known: _Names = {}
         parameters, body = self._source(self._cls, known)
-        lines = "".join(f"\n {line}" for line in body)  # names in it are of fields: identifiers
-        exec(
-            f"def {self._name}({', '.join(parameters)}):{lines}", known
-        )  # names of fields are identifiers
+        lines = "".join(f"\n {line}" for line in body)
+        # Nothing in it is foreign but the names of fields, which are identifiers.
+        exec(f"def {self._name}({', '.join(parameters)}):{lines}", known)
         method = known[self._name]
         method.__qualname__ = f"{self._cls.__qualname__}.{self._name}"
         method.__module__ = self._cls.__module__
@@ -70,14 +69,14 @@ class _Uncompiled:
 
 
 def _init_source(cls: Any, known: _Names) -> _Source:
-    known.update(_set=object.__setattr__, _MISSING=MISSING)
+    known.update(__set=object.__setattr__, __MISSING=MISSING)  # names that no field has
     parameters, body = ["self"], ["pass"]
     for number, field in enumerate(fields(cls)):
-        default, value = _default(field, f"_default_{number}", known)
+        default, value = _default(field, f"__default_{number}", known)
         if field.init:
             parameters.append(f"{field.name}={default}" if default else field.name)
         if field.init or default:
-            body.append(f"_set(self, {field.name!r}, {value})")
+            body.append(f"__set(self, {field.name!r}, {value})")
     if hasattr(cls, "__post_init__"):
         body.append("self.__post_init__()")
     return parameters, body
@@ -87,8 +86,8 @@ def _default(field: Field[Any], name: str, known: _Names) -> tuple[str, str]:
     """What stands for a default among the parameters, and what the field is set to."""
     if field.default_factory is not MISSING:
         known[name] = field.default_factory
-        made = f"{name}() if {field.name} is _MISSING else {field.name}"
-        return "_MISSING", made if field.init else f"{name}()"
+        made = f"{name}() if {field.name} is __MISSING else {field.name}"
+        return "__MISSING", made if field.init else f"{name}()"
     if field.default is not MISSING:
         known[name] = field.default
         return name, field.name if field.init else name
