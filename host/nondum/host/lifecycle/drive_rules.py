@@ -73,8 +73,8 @@ def on_drive_read(turn: Turn, event: DriveRead) -> None:
         "DRIVE_NOT_PAYLOAD",
         "carries no payload",
         where=event.drive,
-        need="a folder nondum/<payload-id>",
-        have="none",
+        need="a folder nondum/<payload-id>, such as nondum/org.example.talker",
+        have="no folder of such a name",
         fix="make one with `nondum payload build`",
     )
     is_empty = not (event.payloads or event.certificates or event.trust_files)
