@@ -24,7 +24,7 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.records.safety import Safety
 from nondum.host.jobs import install as install_job
 from nondum.host.lifecycle import rebuilding
-from nondum.host.manager import installation
+from nondum.host.manager import state_folders
 from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.placement.pins import Pins
@@ -142,7 +142,7 @@ def install(folders: Folders, elsewhere: Path) -> None:
 def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:
     staged = shutil.copytree(lamp(elsewhere / key / "drive"), folders.root / "staging" / key)
     kept = folders.payloads / key
-    installation._move(staged, kept)
+    state_folders.move(staged, kept)
     arguments: dict[str, Any] = {
         "folder": str(kept),
         "venvs": str(elsewhere / "venvs" / key),

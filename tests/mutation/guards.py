@@ -76,6 +76,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     ),
     f"{_H}/jobs/loose_goals.py": (f"{_TH}/jobs/test_loose_goals.py",),
     f"{_H}/jobs/look.py": (f"{_TH}/jobs/test_look.py",),
+    f"{_H}/jobs/cached.py": (f"{_TH}/jobs/test_cached.py",),
     f"{_H}/jobs/noted.py": (f"{_TH}/jobs/test_noted.py",),
     f"{_H}/jobs/read_pace.py": (f"{_TH}/jobs/test_read_pace.py",),
     f"{_H}/jobs/forked_trial.py": (f"{_TH}/jobs/test_forked_trial.py",),

@@ -127,7 +127,7 @@ def test_pulled_drive_withdraws_at_once() -> None:
     assert not state.mounts
     assert state.revision == 2
     assert state.payloads["k1"].step is Step.REMOVING
-    assert done == [effects.ReleaseDrive("a"), effects.ClearPayload("k1", ("eye",))]
+    assert done == [effects.ReleaseDrive("a"), effects.CachePayload("k1", ("eye",))]
 
 
 def test_second_source_keeps_the_payload() -> None:
@@ -187,7 +187,7 @@ def test_unreadable_drive_gives_up_what_was_being_copied() -> None:
     state, done = after(drive(), found(), DriveUnreadable("a", (PROBLEM,)))
     assert state.drives["a"].problems == (PROBLEM,)
     assert state.payloads["k1"].step is Step.REMOVING
-    assert effects.ClearPayload("k1") in done
+    assert effects.CachePayload("k1") in done
 
 
 def test_worker_that_restarts_is_not_ready_meanwhile() -> None:
@@ -304,7 +304,7 @@ def test_drive_that_left_while_the_daemon_was_down_is_withdrawn() -> None:
     recovered = recover(active(), AT).state
     state, done = after(DrivesScanned("slot", ()), state=recovered)
     assert state.payloads["k1"].step is Step.REMOVING
-    assert effects.ClearPayload("k1", ("eye",)) in done
+    assert effects.CachePayload("k1", ("eye",)) in done
 
 
 def test_payload_swapped_while_the_daemon_was_down_is_withdrawn() -> None:

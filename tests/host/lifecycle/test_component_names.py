@@ -56,7 +56,7 @@ def test_its_workers_are_started_by_that_name() -> None:
     [probed] = (e for e in done if isinstance(e, effects.ProbeComponents))
     assert stored.renamed == probed.renamed == {"eye": OTHER}
     _, done = after(*pulled("b", "k2"), state=both())
-    assert effects.ClearPayload("k2", (OTHER,)) in done
+    assert effects.CachePayload("k2", (OTHER,)) in done
 
 
 def test_a_payload_holds_its_names_until_its_workers_have_ended() -> None:

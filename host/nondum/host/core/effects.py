@@ -139,6 +139,11 @@ class ClearPayload(PayloadEffect):
 
 
 @frozen
+class CachePayload(ClearPayload):
+    """The same for one that was withdrawn: it may come back, so what was made of it is cached."""
+
+
+@frozen
 class RestartWorker(Effect):
     """Start a quarantined component's worker once more."""
 

@@ -89,7 +89,7 @@ TRANSITIONS: _Rows = {
     (Step.REFUSED, RollbackAsked): Transition(Step.REMOVING, effects.ClearPayload),
     (Step.QUARANTINED, RetryAsked): Transition(Step.STORED, effects.ProbeComponents),
     **{
-        (step, PayloadWithdrawn): Transition(Step.REMOVING, effects.ClearPayload)
+        (step, PayloadWithdrawn): Transition(Step.REMOVING, effects.CachePayload)
         for step in _PRESENT
     },
     (Step.REMOVING, PayloadCleared): Transition(Step.GONE),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +21,7 @@ from nondum.wheelhouse.format.manifest import ComponentManifest
 from nondum.wheelhouse.payload import memory
 from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload
-from nondum.wheelhouse.store import venvs
+from nondum.wheelhouse.store import disk, venvs
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 from nondum.wheelhouse.store.unpacking import THREADS
@@ -52,7 +51,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
             _make_with_pip(arguments, staged, facts, report)
             fresh, uncompiled = 0, False
         else:
-            fresh, uncompiled = _make(arguments, staged, facts, report)
+            fresh, uncompiled = make_venvs(arguments, staged, facts, report)
         synced.result()
     if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
@@ -75,7 +74,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     }
 
 
-def _make(
+def make_venvs(
     arguments: Arguments, staged: StagedPayload, facts: HostFacts, report: Report
 ) -> tuple[int, bool]:
     """Make the venvs from the store; how many wheels it did not have, and whether any was there
@@ -101,16 +100,10 @@ def _make_with_pip(
 
 def _sync(folder: Path, *, with_wheels: bool) -> None:
     """Have a payload's folder on disk: its metadata, and wheels where the store has them not."""
-    files = [path for path in folder.iterdir() if path.is_file()]
     wheels = folder / "wheels"
     if with_wheels and wheels.exists():
-        files += [*wheels.iterdir(), wheels]
-    for path in (*files, folder, folder.parent):
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        disk.sync_files(wheels)
+    disk.sync_files(folder)
 
 
 def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:

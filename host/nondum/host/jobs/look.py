@@ -27,11 +27,12 @@ from nondum.host.trust.chain import packed
 from nondum.host.trust.on_drives import trust_files_on
 from nondum.host.trust.rules import Rules
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
+from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.build import verification
 from nondum.wheelhouse.format import confinement, contents
 from nondum.wheelhouse.format.contents import Contents
 from nondum.wheelhouse.format.lock import LockedWheel
-from nondum.wheelhouse.format.signatures import Verdict, Verifier
+from nondum.wheelhouse.format.signatures import Grant, Verdict, Verifier
 from nondum.wheelhouse.payload import drive, host_facts, payload, preflight
 from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.memory import Memory, Promised
@@ -101,28 +102,15 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     Raises `PayloadRefused`, `DriveGone`, `InstallFailed`.
     """
     folder, staging = Path(arguments["folder"]), Path(arguments["staging"])
-    data = drive.read_contents(folder)
-    if hashlib.sha256(data).hexdigest() != arguments["digest"]:
-        text = "the contents list is not the one that was read before"
-        fix = "pull the drive and plug it in again"
-        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder), fix=fix))
-    # Trust may have changed since, and what is copied must say for itself why it was let in.
-    signature = drive.read_signature(folder)
-    verdict = Rules.of(arguments).verifier().verify(data, signature)
-    refuse_if_any(verdict.problems)
-    listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+    judged = judged_again(arguments)
+    listed = judged.listed
     refuse_if_any(tuple(payload.oversized(listed)))
     drive.copy(folder, listed, staging, wanted=lambda e: payload.is_metadata(e.path))
-    (staging / contents.NAME).write_bytes(data)
-    if signature is not None:
-        (staging / contents.SIGNATURE_NAME).write_bytes(signature)
+    (staging / contents.NAME).write_bytes(judged.data)
+    judged.keep_signature(staging)
     forked_trial.run(lambda: payload.load(staging, listed), listed.payload_id)
     staged = payload.load(staging, listed)
-    refuse_if_any(verdict.grant.problems(staged.manifest, staged.goals))
-    facts = facts_of(arguments)
-    facts = replace(facts, memory=memory_for(arguments, facts))
-    minimum = listed.minimum_nondum
-    refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum))
+    facts = admitted(arguments, judged, staged)
     needed = chosen(staged, facts)
     known = known_wheels(arguments, staged, facts)
     missing = {locked.path for locked in needed if locked.sha256 not in known}
@@ -130,6 +118,54 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     copied = drive.copy(folder, listed, staging, pace, wanted=lambda e: e.path in missing)
     known_bytes = sum(locked.size for locked in needed if locked.sha256 in known)
     return {"copied": copied, "known": known_bytes}
+
+
+@frozen
+class Judged:
+    """A payload's list on a drive, and what its signatures let it have."""
+
+    data: bytes
+    listed: Contents
+    signature: bytes | None
+    grant: Grant
+
+    def keep_signature(self, folder: Path) -> None:
+        """What is kept of a payload must say for itself why it was let in."""
+        if self.signature is not None:
+            (folder / contents.SIGNATURE_NAME).write_bytes(self.signature)
+        else:
+            (folder / contents.SIGNATURE_NAME).unlink(missing_ok=True)
+
+
+def judged_again(arguments: Arguments) -> Judged:
+    """The payload's list that was found before, judged by what is trusted now.
+
+    Raises `PayloadRefused`, `DriveGone`.
+    """
+    folder = Path(arguments["folder"])
+    data = drive.read_contents(folder)
+    if hashlib.sha256(data).hexdigest() != arguments["digest"]:
+        text = "the contents list is not the one that was read before"
+        fix = "pull the drive and plug it in again"
+        raise PayloadRefused(Problem("HASH_MISMATCH", text, where=str(folder), fix=fix))
+    signature = drive.read_signature(folder)
+    verdict = Rules.of(arguments).verifier().verify(data, signature)
+    refuse_if_any(verdict.problems)
+    listed = contents.parse(data, f"{folder.name}/{contents.NAME}")
+    return Judged(data, listed, signature, verdict.grant)
+
+
+def admitted(arguments: Arguments, judged: Judged, staged: StagedPayload) -> HostFacts:
+    """What this host is, once a payload is found to fit and asks for nothing that is not granted.
+
+    Raises `PayloadRefused`.
+    """
+    refuse_if_any(judged.grant.problems(staged.manifest, staged.goals))
+    facts = facts_of(arguments)
+    facts = replace(facts, memory=memory_for(arguments, facts))
+    minimum = judged.listed.minimum_nondum
+    refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum))
+    return facts
 
 
 def verify(arguments: Arguments, report: Report) -> dict[str, Any]:

@@ -41,6 +41,8 @@ JOBS: Mapping[str, str] = {
     "judge": "nondum.host.jobs.parcel:judge",
     "install": "nondum.host.jobs.install:install",
     "compile": "nondum.host.jobs.compile:compile_wheels",
+    "fill_cache": "nondum.host.jobs.cached:fill",
+    "restore": "nondum.host.jobs.cached:restore",
     "prune": "nondum.host.jobs.install:prune",
     "listing": "nondum.host.jobs.install:listing",
     "sweep": "nondum.host.jobs.install:sweep",
@@ -55,7 +57,7 @@ SERVICES: Mapping[str, str] = {"bridge": "nondum.host.peers.streams.process:main
 """Service → `module:function`. The function runs until the process ends; its argument is the pid of
 the fork server."""
 
-AT_ONCE = ("look", "copy", "verify", "install")
+AT_ONCE = ("look", "copy", "verify", "install", "restore")
 """What people wait for: a child that has time imports these before it is asked."""
 
 

@@ -86,6 +86,7 @@ class Executor:
             effects.RestPayload: self.installation.rest,
             effects.SuspendPayload: self.installation.suspend,
             effects.ClearPayload: self.installation.clear,
+            effects.CachePayload: self._cache,
             effects.RestartWorker: self._restart,
             effects.AttachDevice: self._attach,
             effects.DetachDevice: self._detach,
@@ -147,6 +148,12 @@ class Executor:
 
     async def _compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
         return await self._quiet.run(partial(self.installation.compile, effect))
+
+    async def _cache(self, effect: effects.CachePayload) -> tuple[Event, ...]:
+        told = await self.installation.cache(effect)
+        fill = partial(self.installation.fill_cache, effect.payload)
+        self._queues.add("cache", partial(self._quiet.run, fill))
+        return told
 
     def _want_prune(self) -> None:
         """Have the store pruned; one that is to come serves all who have asked till then."""

@@ -20,6 +20,7 @@ from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.events.payloads import (
     ComponentsProbed,
     PayloadActivated,
+    PayloadCached,
     PayloadCleared,
     PayloadCopied,
     PayloadStaged,
@@ -39,12 +40,14 @@ from nondum.host.lifecycle.retry_causes import Amounts
 from nondum.host.manager.drive_reading import LOOK_S, stalls_as_drive_gone
 from nondum.host.manager.installed_payload import InstalledPayload
 from nondum.host.manager.memory_reservations import MemoryReservations
+from nondum.host.manager.payload_cache import CachedPayload, PayloadCache
 from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
-from nondum.host.manager.state_folders import Folders, missing, remove, sweep
+from nondum.host.manager.state_folders import Folders, missing, move, remove, sweep
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.role import Role
 from nondum.host.workers.spec import Limits, base_interpreter
 from nondum.host.workers.workers import Workers
+from nondum.sdk.codec.values import from_plain
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
 from nondum.sdk.frozen import frozen
@@ -108,7 +111,10 @@ class Installation:
         self._drives: dict[str, str] = {}
         """Payload → the drive that it was copied from: the owner of the children that read it."""
         self._store = asyncio.Lock()
-        """One process writes to the store."""
+        """One process writes to the store, and to the cache."""
+        self._cache = PayloadCache(folders)
+        self._restored: dict[str, dict[str, Any]] = {}
+        """Payload on its way in whose venvs come from the cache → what `install` would tell."""
 
     async def rebuild(self, state: HostState, at: Moment) -> HostState:
         """The state, with what is installed for good and is not in it."""
@@ -136,11 +142,15 @@ class Installation:
         return ()
 
     async def copy(self, effect: effects.CopyPayload) -> tuple[Event, ...]:
-        """Copy to a staging folder that is empty at first."""
+        """Copy to a staging folder that is empty at first, or move there what is cached."""
         staging = self._folders.staging(effect.payload)
         self._drives[effect.payload] = effect.drive
         await self._queue.enter(effect.payload, partial(self._tell_queued, effect.payload))
         await in_thread(remove, staging)
+        if self._cache.get(effect.payload) is not None:
+            known = await self._restore(effect, staging)
+            if known is not None:
+                return (PayloadCopied(effect.payload, 0, known),)
         arguments = self._arguments(
             folder=str(effect.folder),
             digest=effect.digest,
@@ -152,7 +162,11 @@ class Installation:
         return (PayloadCopied(effect.payload, copied["copied"], copied["known"]),)
 
     async def verify(self, effect: effects.VerifyPayload) -> tuple[Event, ...]:
-        """Check the staged copy."""
+        """Check the staged copy; what was cached has been checked."""
+        if (restored := self._restored.get(effect.payload)) is not None:
+            rows = restored["components"]
+            index = {row["id"]: from_plain(PluginDescription, row["description"]) for row in rows}
+            return (PayloadVerified(effect.payload, tuple(index), index),)
         arguments = self._arguments(staging=str(self._folders.staging(effect.payload)))
         said = await self._run("verify", effect.payload, arguments)
         index = {id: PluginDescription.parse(told, where=id) for id, told in said.items()}
@@ -164,13 +178,19 @@ class Installation:
             self._folders.staging(effect.payload),
             self._folders.payload(effect.payload),
         )
-        await in_thread(_move, staging, lasting)
+        await in_thread(move, staging, lasting)
         return (PayloadStaged(effect.payload),)
 
     async def store(self, effect: effects.StoreWheels) -> tuple[Event, ...]:
-        """Fill the store and make the venvs."""
-        made = await self._install(effect.payload, effect.renamed, admit_beside=effect.beside)
-        return (WheelsStored(effect.payload, made.fresh),)
+        """Fill the store and make the venvs, unless they were cached."""
+        key = effect.payload
+        if (restored := self._restored.pop(key, None)) is not None:
+            await in_thread(disk.sync_files, self._folders.payload(key))
+            made = self._parsed(key, restored, effect.renamed)
+            self._installed[key] = made
+        else:
+            made = await self._install(key, effect.renamed, admit_beside=effect.beside)
+        return (WheelsStored(key, made.fresh),)
 
     async def probe(self, effect: effects.ProbeComponents) -> tuple[Event, ...]:
         """Start all workers, or none. Raises `WorkerFailed` with what every one did wrong."""
@@ -246,12 +266,46 @@ class Installation:
         await self._delete(effect, *self._folders.of(effect.payload))
         return (PayloadCleared(effect.payload),)
 
+    async def cache(self, effect: effects.CachePayload) -> tuple[Event, ...]:
+        """The same, but keep its checked files, too, of which `fill_cache` makes venvs again."""
+        key = effect.payload
+        installed = self._installed.get(key)
+        if installed is not None and self._options.method == "store":
+            await self._stop(key, effect.components)
+            try:
+                await in_thread(self._cache.put, key, installed.told)
+            except OSError as error:
+                log.info("%s is not cached: %s", key, error)
+        return await self.clear(effect)
+
+    async def fill_cache(self, key: str) -> None:
+        """Make the venvs of a payload that was withdrawn, if it is still away."""
+        async with self._store:
+            if (cached := self._cache.get(key)) is None or cached.stamp:
+                return
+            try:
+                arguments = self._arguments(
+                    folder=str(cached.folder),
+                    venvs=str(cached.venvs),
+                    python=str(base_interpreter()),
+                )
+                said = await self._children.run_aside("fill_cache", arguments)
+            except NondumError as error:
+                log.info("%s is not cached: %s", key, error)
+                await in_thread(self._cache.drop, key)
+                return
+            told = {**cached.told, "fresh": 0, "uncompiled": said["uncompiled"]}
+            cached = replace(cached, told=told, stamp=said["stamp"])
+            await in_thread(self._cache.filled, cached)
+        self._emit(PayloadCached(key))
+
     async def prune(self) -> None:
-        """Bring the store down to its quota."""
+        """Bring the store down to its quota; what is cached goes first."""
         async with self._store:
             payloads = [str(folder) for folder in self._folders.all_payloads()]
             arguments = self._arguments(folders=payloads, quota_mb=self._options.quota_mb)
-            await self._children.run("prune", arguments, owner=OWN)
+            if await self._children.run("prune", arguments, owner=OWN):
+                await in_thread(self._cache.clear)
 
     async def listing(self) -> list[dict[str, Any]]:
         """What the store holds: wheel, bytes, used_by (payload keys), sha256."""
@@ -292,12 +346,52 @@ class Installation:
             if admit_beside is not None:
                 headroom = await self._reservations.headroom(key, admit_beside)
             told = await self._run("install", key, {**arguments, "headroom": headroom})
-            scratch = partial(self._folders.scratch, key)
-            installed = InstalledPayload.parse(key, told, renamed, scratch)
+            installed = self._parsed(key, told, renamed)
             self._reservations.make(key, installed.needs)
             self._reservations.saw_gpu(installed.gpu)
         self._installed[key] = installed
         return installed
+
+    async def _restore(self, effect: effects.CopyPayload, staging: Path) -> int | None:
+        """Move what is cached of a payload to staging, once it is judged as if it were copied; the
+        bytes that are not copied. None: it is not as it was, and dropped."""
+        key = effect.payload
+        async with self._store:
+            cached = self._cache.get(key)
+            told = await self._judged(effect, cached) if cached and cached.stamp else None
+            if cached is None or told is None:
+                await in_thread(self._cache.drop, key)
+                return None
+            restored = {**cached.told, "grant": told["grant"], "gpu": told["gpu"]}
+            installed = self._parsed(key, restored, {})
+            self._reservations.make(key, installed.needs)
+            self._reservations.saw_gpu(installed.gpu)
+            await in_thread(self._cache.take, cached, staging)
+        self._restored[key] = restored
+        known: int = told["known"]
+        return known
+
+    async def _judged(
+        self, effect: effects.CopyPayload, cached: CachedPayload
+    ) -> dict[str, Any] | None:
+        """What the job `restore` tells. Raises `PayloadRefused`, `DriveGone`."""
+        arguments = self._arguments(
+            folder=str(effect.folder),
+            digest=effect.digest,
+            stamp=cached.stamp,
+            headroom=await self._reservations.headroom(effect.payload, effect.beside),
+            **cached.places(),
+        )
+        with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
+            told: dict[str, Any] | None = await self._run(
+                "restore", effect.payload, arguments, COPY_SILENCE_S
+            )
+        return told
+
+    def _parsed(
+        self, key: str, told: Mapping[str, Any], renamed: Mapping[str, str]
+    ) -> InstalledPayload:
+        return InstalledPayload.parse(key, told, renamed, partial(self._folders.scratch, key))
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
         self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))
@@ -322,6 +416,7 @@ class Installation:
         self._queue.leave(effect.payload)
         await self._children.release(self._drives.pop(effect.payload, effect.payload))
         self._installed.pop(effect.payload, None)
+        self._restored.pop(effect.payload, None)
         self._reservations.give_up(effect.payload)
         scratches = self._folders.scratches_of(effect.payload)
         await in_thread(end_leftovers, scratches)
@@ -341,13 +436,6 @@ class Installation:
             **self._trust.arguments,
             **more,
         }
-
-
-def _move(staging: Path, lasting: Path) -> None:
-    """Rename a folder. The caller syncs it to disk before it says that the payload is stored."""
-    remove(lasting)
-    disk.make_folder(lasting.parent)
-    staging.rename(lasting)
 
 
 def _remove_all(folders: Iterable[Path]) -> None:

@@ -32,6 +32,8 @@ class InstalledPayload:
     """Wheels that the store did not have."""
     is_compiled: bool
     """Whether its workers would start no sooner if its modules were compiled once more."""
+    told: Mapping[str, Any]
+    """What the job told, from which this is."""
 
     @classmethod
     def parse(
@@ -56,6 +58,7 @@ class InstalledPayload:
             Gpu(**told["gpu"]) if told["gpu"] else None,
             told["fresh"],
             not told["uncompiled"],
+            told,
         )
 
     @property

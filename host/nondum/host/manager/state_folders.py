@@ -13,6 +13,7 @@ from nondum.host.core.transitions import KEEPS_FOLDER, KEEPS_VENVS
 from nondum.host.sandbox.helper import privileged
 from nondum.host.workers import scratch
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.store import disk
 
 PRIVATE, PASSABLE = 0o700, 0o711
 PRIVATE_FILE = 0o600
@@ -76,6 +77,11 @@ class Folders:
     def placed(self) -> Path:
         """Payloads that other hosts have handed over: each a folder like a drive."""
         return self.root / "placed"
+
+    @property
+    def cache(self) -> Path:
+        """What was made of payloads that were withdrawn, in case they come back."""
+        return self.root / "cache"
 
     @property
     def planning(self) -> Path:
@@ -195,6 +201,16 @@ def remove(folder: Path) -> None:
         log.warning("%s is not deleted whole: %s", folder, error)
 
 
+def move(folder: Path, target: Path) -> None:
+    """Rename a folder, in the place of any that is there. What must last is synced by the caller.
+
+    Raises `OSError`.
+    """
+    remove(target)
+    disk.make_folder(target.parent)
+    folder.rename(target)
+
+
 def missing(folders: Folders, state: HostState) -> frozenset[str]:
     """Keys of payloads whose checked files should be there and are not."""
     return frozenset(
@@ -208,6 +224,7 @@ def _orphans(folders: Folders, state: HostState) -> Iterator[Path]:
     steps = {key: payload.step for key, payload in state.payloads.items()}
     kept = {
         "staging": frozenset[str](),
+        "cache": frozenset(),
         "handover": frozenset(),
         "placed": frozenset(),
         "payloads": {key for key, step in steps.items() if step in KEEPS_FOLDER},

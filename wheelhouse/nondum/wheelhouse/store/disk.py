@@ -62,6 +62,12 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
+def sync_files(folder: Path) -> None:
+    """Have the files in a folder on disk, the folder itself, and that it is there."""
+    for path in (*(path for path in folder.iterdir() if path.is_file()), folder, folder.parent):
+        sync(path)
+
+
 def sync_file_system(folder: Path) -> None:
     """syncfs(2): one call for all files just written, cheaper than an fsync for each."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)

@@ -182,6 +182,14 @@ class ProgressMade(Event):
 
 
 @frozen
+class PayloadCached(Event):
+    """The venvs of a payload that was withdrawn are made again, in case it comes back."""
+
+    JOURNALLED: ClassVar[bool] = False
+    payload: str
+
+
+@frozen
 class WheelsCompiled(Event):
     """Workers of a payload find its modules compiled when they are started again."""
 
