@@ -19,6 +19,7 @@ CONFIGURATION = """
 name = "rover"
 state = "{folder}/state"
 control = "{folder}/control"
+keep_ready_above_mb = {ready_above_mb}
 [drives]
 slots = ["{folder}/slots"]
 allow_unsigned = true
@@ -30,13 +31,17 @@ process = {process}
 
 
 @contextmanager
-def running(folder: Path, *, apart: bool = False) -> Iterator[tuple[int, float]]:
+def running(
+    folder: Path, *, apart: bool = False, ready_above_mb: int = 0
+) -> Iterator[tuple[int, float]]:
     """A host that has said that it is ready (sd_notify(3)): its process, and how many seconds that
     took. `folder` has a short path (unix(7)), and keeps its state from one to the next; `apart`
-    puts the links to peers into a separate process."""
+    puts the links to peers into a separate process; `ready_above_mb`: see docs/configuration.md."""
     ready = folder / "ready"
     ready.unlink(missing_ok=True)
-    configuration = CONFIGURATION.format(folder=folder, process=str(apart).lower())
+    configuration = CONFIGURATION.format(
+        folder=folder, process=str(apart).lower(), ready_above_mb=ready_above_mb
+    )
     (folder / "host.toml").write_text(configuration, encoding="utf-8")
     command = [sys.executable, "-m", "nondum.cli", "host", "run", "--user"]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
@@ -57,13 +62,13 @@ def running(folder: Path, *, apart: bool = False) -> Iterator[tuple[int, float]]
             process.wait()
 
 
-def await_worker(pid: int) -> None:
-    """Wait until there are two workers: that of the payload, and the spare.
+def await_worker(pid: int, workers: int = 2) -> None:
+    """Wait until there are as many workers: that of the payload and, if there is one, the spare.
 
     Raises `TimeoutError`.
     """
     until = time.monotonic() + PATIENCE_S
-    while len(probe.memory(pid).get("worker", [])) < 2:
+    while len(probe.memory(pid).get("worker", [])) < workers:
         if time.monotonic() > until:
             raise TimeoutError("the payload has no worker")
         time.sleep(0.2)

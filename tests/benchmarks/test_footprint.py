@@ -79,6 +79,17 @@ def test_host_keeps_to_its_memory(folder: Path) -> None:
     assert taken["daemon"][0] * 1024 <= DAEMON_MB * MB, "with one payload it is much the same"
 
 
+@pytest.mark.daemon
+def test_host_with_little_memory_keeps_nothing_ready(folder: Path) -> None:
+    """What its children are forked from is there as it starts, and ends by itself."""
+    with running(folder, ready_above_mb=10**9) as (pid, _):
+        assert probe.memory(pid).keys() <= {"daemon", "drive child"}
+        make_payload(folder / "stick", talker())
+        (folder / "stick").rename(folder / "slots/stick")
+        await_worker(pid, workers=1)
+        assert len(probe.memory(pid)["worker"]) == 1
+
+
 def test_page_is_what_was_measured() -> None:
     before = report.PAGE.read_text(encoding="utf-8")
     assert report.page(results.kept()) == before

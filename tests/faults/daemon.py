@@ -47,7 +47,7 @@ from nondum.host.lifecycle.advance import RULES
 from nondum.host.manager import state_lock
 from nondum.host.manager.component_manager import ComponentManager
 from nondum.host.manager.effect_handlers import Executor
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.state_folders import Folders
 from nondum.host.service.stop_signals import told_to_stop
 from nondum.host.sources.drives.slots import SlotSource

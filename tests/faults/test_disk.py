@@ -19,7 +19,7 @@ from nondum.host.core.events.catalogue import CatalogueSetAside, CatalogueWritte
 from nondum.host.core.records.step import Step
 from nondum.host.manager import state_lock
 from nondum.host.manager.initial_components import install, uninstall
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.refusal_retry import RefusalRetry
 from nondum.sdk.errors import ConfigRefused
 

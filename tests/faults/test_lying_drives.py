@@ -21,7 +21,8 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.step import Step
 from nondum.host.jobs.children import START_S
 from nondum.host.manager.drive_reading import LOOK_S
-from nondum.host.manager.installation import COPY_SILENCE_S, InstallOptions
+from nondum.host.manager.install_options import InstallOptions
+from nondum.host.manager.installation import COPY_SILENCE_S
 
 pytestmark = [
     pytest.mark.anyio,

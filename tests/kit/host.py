@@ -23,7 +23,7 @@ from nondum.host.lifecycle.advance import RULES
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.component_manager import ComponentManager
 from nondum.host.manager.effect_handlers import Executor
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.state_folders import Folders
 from nondum.host.sources.drives.slots import SlotSource
 from nondum.host.sources.drives.source import DriveSource

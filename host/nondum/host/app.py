@@ -223,7 +223,8 @@ class RunningHost:
         own = self.base.config.host
         log.info("host %s listens at %s", own.name, own.control)
         try:
-            await self.workers.keep_spare()
+            if self.base.keeps_ready:
+                await self.workers.keep_spare()
             if self.peers is not None:
                 await self.peers.start()
             malloc.keep_what_is_loaded()

@@ -34,9 +34,12 @@ WithPython = Callable[[str], None]
 
 @contextlib.asynccontextmanager
 async def fork_client(
-    module: str = "nondum.host.jobs.child", on_crowded: Callable[[], None] = lambda: None
+    module: str = "nondum.host.jobs.child",
+    on_crowded: Callable[[], None] = lambda: None,
+    *,
+    stays: bool = True,
 ) -> AsyncIterator[ForkClient]:
-    client = ForkClient(module, on_crowded)
+    client = ForkClient(module, on_crowded, stays=stays)
     try:
         yield client
     finally:
@@ -135,6 +138,33 @@ async def test_server_that_has_ended_prepares_for_nothing_and_is_started_again()
         forked = await client.fork(JOB, START_S)
         assert server_of(client) != former
         forked.close()
+
+
+async def test_server_that_does_not_stay_is_there_while_something_of_it_runs() -> None:
+    async with fork_client(stays=False) as client:
+        await client.expect(JOB)
+        assert client.pid is None
+        forked = await client.fork(JOB, START_S)
+        first = server_of(client)
+        await client.rest()
+        assert client.pid == first
+        forked.kill()
+        await forked.over()
+        with process_ended(first) as ended:
+            await client.rest()
+            await ended.wait()
+        assert client.pid is None
+        forked.close()
+        (await client.fork(JOB, START_S)).close()
+        assert server_of(client) != first
+
+
+async def test_server_that_stays_does_not_end_when_it_rests() -> None:
+    async with fork_client() as client:
+        await client.expect(JOB)
+        first = server_of(client)
+        await client.rest()
+        assert client.pid == first
 
 
 async def test_process_is_killed_once_nothing_waits_for_it() -> None:

@@ -20,7 +20,7 @@ from nondum.host.core.events.payloads import PayloadActivated, PayloadCached, Pa
 from nondum.host.core.records.step import Step
 from nondum.host.jobs import cached, install, look
 from nondum.host.manager import payload_cache
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.workers.spec import Timing
 from nondum.wheelhouse.payload.memory import Promised
 from nondum.wheelhouse.store.store import Store

@@ -237,6 +237,21 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
         assert not pool.pids()
 
 
+async def test_fork_server_that_does_not_stay_ends_after_the_last_child(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    pool = Children(stays=False)
+    try:
+        await pool.run("look", drive(tmp_path), owner="a")
+        assert pool.server is not None
+        with process_ended(pool.server) as ended:
+            await clock.advance(QUIET_S)
+            await ended.wait()
+        await pool.run("look", drive(tmp_path), owner="a")
+    finally:
+        await pool.close()
+
+
 async def test_child_is_not_said_to_hang_before_the_server_tells_its_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

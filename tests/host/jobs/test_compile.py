@@ -15,7 +15,7 @@ from tests.kit.until import arrived
 from nondum.host.core.events.payloads import WheelsCompiled
 from nondum.host.core.events.workers import WorkerLogged
 from nondum.host.core.records.step import Step
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.sources.inotify import folders_watched
 from nondum.wheelhouse.store import bytecode
 from nondum.wheelhouse.store.store import UNFINISHED, Store

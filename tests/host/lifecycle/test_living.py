@@ -23,7 +23,7 @@ from nondum.host.core.records.step import Step
 from nondum.host.core.state import HostState
 from nondum.host.lifecycle.crash_attribution import STEADY_S
 from nondum.host.manager.initial_components import install, uninstall
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.state_folders import Folders
 from nondum.sdk.errors import PayloadRefused
 

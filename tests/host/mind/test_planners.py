@@ -16,7 +16,7 @@ from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
 from nondum.host.mind.planner_process import QUIET_S, PlannerProcess, planner_forks
 from nondum.host.mind.planner_wire import Request
-from nondum.host.mind.planners import Planners
+from nondum.host.mind.planners import CHEAPER_S, Planners
 from nondum.sdk.errors import PlannerFailed
 from nondum.sdk.planner import (
     AlreadyTrue,
@@ -153,6 +153,27 @@ async def test_child_stays_for_the_next_task_and_ends_without_one(
         await clock.advance(0.2 * QUIET_S)
         await ended.wait()
     assert isinstance(await process.plan(Request(task), 5.0), Plan)
+
+
+async def test_fork_server_that_does_not_stay_ends_after_the_last_planner(
+    clock: VirtualClock, task: GroundTask
+) -> None:
+    forks = planner_forks(stays=False)
+    process = PlannerProcess(
+        "native", "nondum.host.mind.native_planner:NativePlanner", forks, memory_mb=512
+    )
+    try:
+        await process.warm()
+        assert forks.pid is None
+        await process.plan(Request(task), 5.0)
+        assert forks.pid is not None
+        with process_ended(forks.pid) as ended:
+            await clock.advance(1.1 * QUIET_S)
+            await ended.wait()
+        assert isinstance(await process.plan(Request(task), 5.0), Plan)
+    finally:
+        await process.close()
+        await forks.close()
 
 
 @pytest.mark.parametrize(
@@ -305,11 +326,13 @@ async def test_first_valid_plan_wins(planner: Make, task: GroundTask) -> None:
     assert found.planner == "pyperplan"
 
 
-async def test_cheaper_plan_is_waited_for(planner: Make) -> None:
-    """A small task's first plan may come from a planner that knows no costs."""
+@pytest.fixture
+def costly() -> GroundTask:
+    """A small task whose shortest plan is dear: its first plan may come from a planner that knows
+    no costs."""
     fact = frozenset[int]
     dear, cheap = fact({0}), fact({1})
-    task = GroundTask(
+    return GroundTask(
         ("start", "half", "done"),
         dear,
         fact({2}),
@@ -319,11 +342,26 @@ async def test_cheaper_plan_is_waited_for(planner: Make) -> None:
             GroundAction("step on", cheap, fact({2}), fact(), 1),
         ),
     )
-    planners = Planners([planner("spender"), planner("native"), planner("hanger")])
-    await planners.warm()
-    found = await planners.plan(task, 20.0)
+
+
+async def test_cheaper_plan_is_waited_for(
+    planner: Make, costly: GroundTask, clock: VirtualClock
+) -> None:
+    planners = Planners([planner("spender"), planner("native")])
+    found = await arrived("both plans", planners.plan(costly, 20.0))
     assert found.answer == Plan((1, 2), 2)
     assert found.planner == "native"
+
+
+async def test_cheaper_plan_is_not_waited_for_long(
+    planner: Make, costly: GroundTask, clock: VirtualClock
+) -> None:
+    spender = planner("spender")
+    await spender.plan(Request(costly), 20.0)
+    planning = Planners([spender, planner("hanger")]).plan(costly, 20.0)
+    found = await clock.advance_until(planning, step_s=CHEAPER_S / 10)
+    assert (found.planner, found.answer) == ("spender", Plan((0,), 9))
+    assert found.took_s < 20.0
 
 
 def with_everything() -> GroundTask:

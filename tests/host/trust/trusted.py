@@ -11,7 +11,7 @@ from tests.kit.payloads import Part, make_payload, seal
 from tests.kit.signing import Key, sign_payload, signed, trust_of
 
 from nondum.host.core.events.drives import DriveRead
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.payload_trust import TrustOptions
 from nondum.wheelhouse.trust.succession import SignedFile
 from nondum.wheelhouse.trust.trust import Trust

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.host_config import HostConfig
 from nondum.host.core.bus import Bus
@@ -23,3 +25,9 @@ class Base:
     extensions: Extensions
     service: Service
     counter: CrashCounter
+
+    @property
+    def keeps_ready(self) -> bool:
+        """Whether processes are kept ready for what may be plugged in or wanted next."""
+        memory_mb = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20
+        return memory_mb > self.config.host.keep_ready_above_mb

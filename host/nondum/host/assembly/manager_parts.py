@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from nondum.host.assembly.base import Base
-from nondum.host.config.host_config import HostConfig
 from nondum.host.core.records.safety import Safety
 from nondum.host.manager.component_manager import ComponentManager
 from nondum.host.manager.effect_handlers import Executor
-from nondum.host.manager.installation import InstallOptions
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.payload_trust import TrustOptions
 from nondum.host.sources.drives.source import DriveSource
 from nondum.host.workers.spec import Limits
@@ -30,7 +29,7 @@ def make_manager(
 ) -> ManagerParts:
     """Make the component manager of these drives; `safety` is which payloads it leaves alone, and
     why."""
-    options, bus = _install_options(base.config), base.bus
+    options, bus = _install_options(base), base.bus
     executor = Executor(base.config.host.name, base.folders, workers, bus.emit, options)
     manager = ComponentManager(base.catalogue, executor, bus)
     manager.leave_alone(*safety)
@@ -39,7 +38,8 @@ def make_manager(
     return ManagerParts(manager, executor)
 
 
-def _install_options(config: HostConfig) -> InstallOptions:
+def _install_options(base: Base) -> InstallOptions:
+    config = base.config
     return InstallOptions(
         allow_unsigned=config.drives.allow_unsigned,
         look_s=config.drives.look_s,
@@ -47,6 +47,7 @@ def _install_options(config: HostConfig) -> InstallOptions:
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,
         quota_mb=config.install.quota_mb,
+        keeps_ready=base.keeps_ready,
         limits=Limits(
             memory_mb=config.workers.memory_mb,
             tasks=config.workers.tasks,

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from nondum.host.assembly.base import Base
-from nondum.host.config.host_config import HostConfig
-from nondum.host.extension.loading import Extensions
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.planners import Planners
 from nondum.host.mind.runner import Calls
@@ -23,7 +19,7 @@ def make_mind(base: Base, workers: Workers, calls: Calls) -> Mind:
     return Mind(
         config.host.name,
         calls,
-        _planners(config, base.extensions, base.folders.planning),
+        _planners(base),
         emit=base.bus.emit,
         ask=workers.ask,
         deadline_s=planning.deadline_s,
@@ -32,17 +28,23 @@ def make_mind(base: Base, workers: Workers, calls: Calls) -> Mind:
     )
 
 
-def _planners(config: HostConfig, extensions: Extensions, temporary: Path) -> Planners:
+def _planners(base: Base) -> Planners:
     """The planners of all extensions, or those that the configuration names.
 
     Raises `ConfigRefused` (CONFIG_PLANNER).
     """
-    found: dict[str, str] = dict(extensions.asked("planners"))
-    wanted = config.planning.planners
+    planning = base.config.planning
+    found: dict[str, str] = dict(base.extensions.asked("planners"))
+    wanted = planning.planners
     if unknown := [name for name in wanted if name not in found]:
         known = ", ".join(sorted(found)) or "none"
         text = f"no planner {unknown[0]!r} is installed"
         problem = Problem("CONFIG_PLANNER", text, where="planning.planners", have=known)
         raise ConfigRefused(problem)
     chosen = {name: found[name] for name in wanted or found}
-    return Planners.of(chosen, memory_mb=config.planning.memory_mb, temporary=temporary)
+    return Planners.of(
+        chosen,
+        memory_mb=planning.memory_mb,
+        temporary=base.folders.planning,
+        stays=base.keeps_ready,
+    )

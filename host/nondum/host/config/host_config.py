@@ -32,6 +32,10 @@ class HostSection:
     """The control socket."""
     system_tree: str = "nondum.host.mind.system_tree:default_tree"
     """`package:function` that makes the system tree."""
+    keep_ready_above_mb: int = 2048
+    """A machine with more memory keeps processes ready for what is plugged in or wanted next, which
+    take some 45 MB; another one starts them when they are needed, and ends them after half a
+    minute."""
 
 
 @frozen

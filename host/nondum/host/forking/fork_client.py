@@ -108,16 +108,20 @@ class ForkClient:
         on_crowded: Callable[[], None] = lambda: None,
         *,
         environment: Mapping[str, str] = MappingProxyType({}),
+        stays: bool = True,
     ) -> None:
         """`module` is run as a program with this process's id and the descriptor of its end of the
         channel (`fork_server.serve`), with `environment` added to that of this
         process. `on_crowded` is called when descriptors cannot be sent yet since too many of this
-        user's are under way (ETOOMANYREFS, unix(7)): that is tried again."""
-        self._module, self._on_crowded = module, on_crowded
+        user's are under way (ETOOMANYREFS, unix(7)): that is tried again. Unless it `stays`, the
+        server is started when something is forked only, and ends when it is let rest."""
+        self._module, self._on_crowded, self._stays = module, on_crowded, stays
         self._environment = environment
         self._server: Process | None = None
         self._channel: socket.socket | None = None
         self._expected: list[str] = []
+        self._running: list[Forked] = []
+        """Those that may run."""
         self._turn = asyncio.Lock()
 
     @property
@@ -148,6 +152,8 @@ class ForkClient:
             if message in self._expected:
                 return
             self._expected.append(message)
+            if self._channel is None and not self._stays:
+                return
             try:
                 if self._channel is None:
                     self._channel = await self._start()
@@ -155,6 +161,13 @@ class ForkClient:
                     fork_server.ask(self._channel, message.encode(), ())
             except OSError as error:
                 log.warning("the fork server cannot prepare for %s: %s", message, error)
+
+    async def rest(self) -> None:
+        """Nothing is to be forked for a while: unless it stays, end the server, if nothing that it
+        forked runs."""
+        async with self._turn:
+            if not self._stays and all(forked.is_over for forked in self._running):
+                await self._end()
 
     async def close(self) -> None:
         """End the server, and all that it forked."""
@@ -234,6 +247,7 @@ class ForkClient:
             failed.callback(_kill, descriptor)
             forked = Forked(pid, descriptor, status, ours)
             failed.pop_all()
+            self._running = [*(other for other in self._running if not other.is_over), forked]
             return forked
 
     async def _end(self) -> None:

@@ -95,11 +95,15 @@ class Children:
     """A pool that grows as jobs need it, and shrinks to nothing. `close` it."""
 
     def __init__(
-        self, *, quiet_s: float = QUIET_S, on_crowded: Callable[[], None] = lambda: None
+        self,
+        *,
+        quiet_s: float = QUIET_S,
+        on_crowded: Callable[[], None] = lambda: None,
+        stays: bool = True,
     ) -> None:
-        """`on_crowded`: see `ForkClient`."""
+        """`on_crowded`, and whether the fork server `stays`: see `ForkClient`."""
         self._quiet_s = quiet_s
-        self.forks = ForkClient("nondum.host.jobs.child", on_crowded)
+        self.forks = ForkClient("nondum.host.jobs.child", on_crowded, stays=stays)
         """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
         self._kept: dict[str, _Child] = {}
         """Owner → the child that worked for this owner only; the last ones last."""
@@ -231,6 +235,7 @@ class Children:
         await asyncio.sleep(self._quiet_s)
         while self._kept:
             await self._end(self._kept.pop(next(iter(self._kept))))
+        await self.forks.rest()
 
     async def _end(self, child: _Child) -> None:
         self._busy.discard(child)

@@ -26,7 +26,8 @@ from nondum.host.jobs.children import Children
 from nondum.host.jobs.idle_scheduling import IdleScheduler
 from nondum.host.lifecycle import payload_rules
 from nondum.host.manager.drive_reading import DriveReading
-from nondum.host.manager.installation import Installation, InstallOptions
+from nondum.host.manager.install_options import InstallOptions
+from nondum.host.manager.installation import Installation
 from nondum.host.manager.payload_trust import PayloadTrust
 from nondum.host.manager.state_folders import Folders
 from nondum.host.workers.workers import Workers
@@ -60,7 +61,7 @@ class Executor:
     ) -> None:
         options = options or InstallOptions()
         self._workers, self._emit = workers, emit
-        self.children = Children(on_crowded=workers.search.begin)
+        self.children = Children(on_crowded=workers.search.begin, stays=options.keeps_ready)
         self.trust = PayloadTrust(
             host, folders, self.children, options.trust, allow_unsigned=options.allow_unsigned
         )

@@ -10,7 +10,7 @@ import logging
 import shutil
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,20 +37,20 @@ from nondum.host.jobs.children import STALL_S, Children
 from nondum.host.jobs.queue import Queue
 from nondum.host.lifecycle.rebuilding import with_found, write_note
 from nondum.host.lifecycle.retry_causes import Amounts
-from nondum.host.manager.drive_reading import LOOK_S, stalls_as_drive_gone
+from nondum.host.manager.drive_reading import stalls_as_drive_gone
+from nondum.host.manager.install_options import InstallOptions
 from nondum.host.manager.installed_payload import InstalledPayload
 from nondum.host.manager.memory_reservations import MemoryReservations
-from nondum.host.manager.payload_cache import CachedPayload, PayloadCache
-from nondum.host.manager.payload_trust import PayloadTrust, TrustOptions
+from nondum.host.manager.payload_cache import PayloadCache
+from nondum.host.manager.payload_trust import PayloadTrust
 from nondum.host.manager.state_folders import Folders, missing, move, remove, sweep
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.role import Role
-from nondum.host.workers.spec import Limits, base_interpreter
+from nondum.host.workers.spec import base_interpreter
 from nondum.host.workers.workers import Workers
 from nondum.sdk.codec.values import from_plain
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import NondumError, WorkerFailed, problems_of
-from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.payload.memory import Memory, Promised, free_memory_mb
 from nondum.wheelhouse.store import disk
 
@@ -69,24 +69,6 @@ STOP_S = 1.5
 is for deleting."""
 
 log = logging.getLogger(__name__)
-
-
-@frozen
-class InstallOptions:
-    """How payloads are judged and installed on this host."""
-
-    allow_unsigned: bool = False
-    look_s: float = LOOK_S
-    """A drive that cannot be mounted and listed in this time hangs."""
-    method: str = "store"
-    """`store`: links to the store. `pip`: pip itself."""
-    reserve_mb: int = 64
-    """Disk that is left free."""
-    quota_mb: int = 4096
-    """Size that the store is pruned to."""
-    limits: Limits = field(default_factory=Limits)
-    """Of each worker."""
-    trust: TrustOptions = field(default_factory=TrustOptions)
 
 
 class Installation:
@@ -112,7 +94,7 @@ class Installation:
         """Payload → the drive that it was copied from: the owner of the children that read it."""
         self._store = asyncio.Lock()
         """One process writes to the store, and to the cache."""
-        self._cache = PayloadCache(folders)
+        self._cache = PayloadCache(folders, children)
         self._restored: dict[str, dict[str, Any]] = {}
         """Payload on its way in whose venvs come from the cache → what `install` would tell."""
 
@@ -147,7 +129,7 @@ class Installation:
         self._drives[effect.payload] = effect.drive
         await self._queue.enter(effect.payload, partial(self._tell_queued, effect.payload))
         await in_thread(remove, staging)
-        if self._cache.get(effect.payload) is not None:
+        if effect.payload in self._cache:
             known = await self._restore(effect, staging)
             if known is not None:
                 return (PayloadCopied(effect.payload, 0, known),)
@@ -281,23 +263,8 @@ class Installation:
     async def fill_cache(self, key: str) -> None:
         """Make the venvs of a payload that was withdrawn, if it is still away."""
         async with self._store:
-            if (cached := self._cache.get(key)) is None or cached.stamp:
-                return
-            try:
-                arguments = self._arguments(
-                    folder=str(cached.folder),
-                    venvs=str(cached.venvs),
-                    python=str(base_interpreter()),
-                )
-                said = await self._children.run_aside("fill_cache", arguments)
-            except NondumError as error:
-                log.info("%s is not cached: %s", key, error)
-                await in_thread(self._cache.drop, key)
-                return
-            told = {**cached.told, "fresh": 0, "uncompiled": said["uncompiled"]}
-            cached = replace(cached, told=told, stamp=said["stamp"])
-            await in_thread(self._cache.filled, cached)
-        self._emit(PayloadCached(key))
+            if await self._cache.fill(key, self._arguments(python=str(base_interpreter()))):
+                self._emit(PayloadCached(key))
 
     async def prune(self) -> None:
         """Bring the store down to its quota; what is cached goes first."""
@@ -347,46 +314,34 @@ class Installation:
                 headroom = await self._reservations.headroom(key, admit_beside)
             told = await self._run("install", key, {**arguments, "headroom": headroom})
             installed = self._parsed(key, told, renamed)
-            self._reservations.make(key, installed.needs)
-            self._reservations.saw_gpu(installed.gpu)
+            self._promise(installed)
         self._installed[key] = installed
         return installed
 
     async def _restore(self, effect: effects.CopyPayload, staging: Path) -> int | None:
-        """Move what is cached of a payload to staging, once it is judged as if it were copied; the
-        bytes that are not copied. None: it is not as it was, and dropped."""
+        """Move what is cached of a payload to staging; the bytes that are not copied. None: it is
+        not as it was."""
         key = effect.payload
         async with self._store:
-            cached = self._cache.get(key)
-            told = await self._judged(effect, cached) if cached and cached.stamp else None
-            if cached is None or told is None:
-                await in_thread(self._cache.drop, key)
+            arguments = self._arguments(
+                folder=str(effect.folder),
+                digest=effect.digest,
+                headroom=await self._reservations.headroom(key, effect.beside),
+            )
+            run = partial(self._run, "restore", key, stall_s=COPY_SILENCE_S)
+            with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
+                restored = await self._cache.restore(key, run, arguments, staging)
+            if restored is None:
                 return None
-            restored = {**cached.told, "grant": told["grant"], "gpu": told["gpu"]}
-            installed = self._parsed(key, restored, {})
-            self._reservations.make(key, installed.needs)
-            self._reservations.saw_gpu(installed.gpu)
-            await in_thread(self._cache.take, cached, staging)
+            self._promise(self._parsed(key, restored, {}))
         self._restored[key] = restored
-        known: int = told["known"]
+        known: int = restored["known"]
         return known
 
-    async def _judged(
-        self, effect: effects.CopyPayload, cached: CachedPayload
-    ) -> dict[str, Any] | None:
-        """What the job `restore` tells. Raises `PayloadRefused`, `DriveGone`."""
-        arguments = self._arguments(
-            folder=str(effect.folder),
-            digest=effect.digest,
-            stamp=cached.stamp,
-            headroom=await self._reservations.headroom(effect.payload, effect.beside),
-            **cached.places(),
-        )
-        with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
-            told: dict[str, Any] | None = await self._run(
-                "restore", effect.payload, arguments, COPY_SILENCE_S
-            )
-        return told
+    def _promise(self, installed: InstalledPayload) -> None:
+        """Reserve the memory that it needs."""
+        self._reservations.make(installed.key, installed.needs)
+        self._reservations.saw_gpu(installed.gpu)
 
     def _parsed(
         self, key: str, told: Mapping[str, Any], renamed: Mapping[str, str]

@@ -10,23 +10,31 @@ A starting daemon deletes all of it. What came with pip is not cached: it would 
 from __future__ import annotations
 
 import errno
+import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from nondum.host.core.keyed_queues import in_thread
+from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import PRIVATE, Folders, move, remove
+from nondum.sdk.errors import NondumError
 from nondum.sdk.frozen import frozen
 
 CACHED = 8
 """Payloads at most; those that were withdrawn last stay."""
+
+Run = Callable[[dict[str, Any]], Awaitable[dict[str, Any] | None]]
+
+log = logging.getLogger(__name__)
 
 
 @frozen
 class CachedPayload:
     """One of them."""
 
-    key: str
     folder: Path
     venvs: Path
     told: Mapping[str, Any]
@@ -34,24 +42,19 @@ class CachedPayload:
     stamp: str = ""
     """Of its files, as the job `fill_cache` left them; "": it is not done."""
 
-    def places(self) -> dict[str, str]:
-        """Where its files are, for the jobs."""
-        return {"cached_folder": str(self.folder), "cached_venvs": str(self.venvs)}
-
 
 class PayloadCache:
-    """Payload → what is cached of it. All methods but `get` block."""
+    """Payload → what is cached of it. Nothing else may write to the store meanwhile."""
 
-    def __init__(self, folders: Folders) -> None:
-        self._folders = folders
+    def __init__(self, folders: Folders, children: Children) -> None:
+        self._folders, self._children = folders, children
         self._cached: dict[str, CachedPayload] = {}
 
-    def get(self, key: str) -> CachedPayload | None:
-        """What is cached of a payload."""
-        return self._cached.get(key)
+    def __contains__(self, key: str) -> bool:
+        return key in self._cached
 
     def put(self, key: str, told: Mapping[str, Any]) -> None:
-        """Take a payload's checked files.
+        """Take a payload's checked files. Blocks.
 
         Raises `OSError`, also where what is in the store cannot be linked: it would be there twice.
         """
@@ -60,29 +63,58 @@ class PayloadCache:
         if self._folders.cache.stat().st_dev != self._folders.store.stat().st_dev:
             raise OSError(errno.EXDEV, os.strerror(errno.EXDEV), str(self._folders.store))
         root = self._folders.cache / key
-        cached = CachedPayload(key, root / "payload", root / "venvs", told)
+        cached = CachedPayload(root / "payload", root / "venvs", told)
         move(self._folders.payload(key), cached.folder)
         self._cached[key] = cached
 
-    def filled(self, cached: CachedPayload) -> None:
-        """Its venvs are made. The oldest gives way if there are too many."""
-        self._cached.pop(cached.key)
-        self._cached[cached.key] = cached
-        if len(self._cached) > CACHED:
-            self.drop(next(iter(self._cached)))
+    async def fill(self, key: str, arguments: Mapping[str, Any]) -> bool:
+        """Make a payload's venvs, if it is still away; whether they have been made.
 
-    def take(self, cached: CachedPayload, staging: Path) -> None:
-        """Move its files to staging, its venvs where workers find them. Raises `OSError`."""
-        move(cached.folder, staging)
-        move(cached.venvs, self._folders.venvs(cached.key))
-        self.drop(cached.key)
+        The oldest payload gives way if there are too many.
+        """
+        if (cached := self._cached.get(key)) is None or cached.stamp:
+            return False
+        places = {"folder": str(cached.folder), "venvs": str(cached.venvs)}
+        try:
+            said = await self._children.run_aside("fill_cache", {**arguments, **places})
+        except NondumError as error:
+            log.info("%s is not cached: %s", key, error)
+            await in_thread(self.drop, key)
+            return False
+        told = {**cached.told, "fresh": 0, "uncompiled": said["uncompiled"]}
+        del self._cached[key]
+        self._cached[key] = replace(cached, told=told, stamp=said["stamp"])
+        if len(self._cached) > CACHED:
+            await in_thread(self.drop, next(iter(self._cached)))
+        return True
+
+    async def restore(
+        self, key: str, run: Run, arguments: Mapping[str, Any], staging: Path
+    ) -> dict[str, Any] | None:
+        """Move a payload's files to staging, its venvs where workers find them, once it is judged
+        as if it were copied: what `install` would tell, and the `known` bytes.
+
+        None: it is not as it was, and dropped. `run` does the job. Raises what that does, and
+        `OSError`.
+        """
+        if (cached := self._cached.get(key)) is None:
+            return None
+        places = {"cached_folder": str(cached.folder), "cached_venvs": str(cached.venvs)}
+        told = None
+        if cached.stamp:
+            told = await run({**arguments, **places, "stamp": cached.stamp})
+        if told is not None:
+            await in_thread(move, cached.folder, staging)
+            await in_thread(move, cached.venvs, self._folders.venvs(key))
+        await in_thread(self.drop, key)
+        return None if told is None else {**cached.told, **told}
 
     def drop(self, key: str) -> None:
-        """Delete what is cached of a payload, if anything is."""
+        """Delete what is cached of a payload, if anything is. Blocks."""
         if self._cached.pop(key, None) is not None:
             remove(self._folders.cache / key)
 
     def clear(self) -> None:
-        """Delete all of it."""
+        """Delete all of it. Blocks."""
         for key in tuple(self._cached):
             self.drop(key)

@@ -34,11 +34,15 @@ log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
 
-def planner_forks(environment: Mapping[str, str] | None = None) -> ForkClient:
-    """The fork server of planners, with `environment` added to that of this process. Close it."""
+def planner_forks(
+    environment: Mapping[str, str] | None = None, *, stays: bool = True
+) -> ForkClient:
+    """The fork server of planners, with `environment` added to that of this process; whether it
+    `stays` when no planner has a task: see `ForkClient`. Close it."""
     return ForkClient(
         "nondum.host.mind.planner_child",
         environment={"PYTHONHASHSEED": "0", **(environment or {})},
+        stays=stays,
     )
 
 
@@ -129,6 +133,7 @@ class PlannerProcess:
             now_s = asyncio.get_running_loop().time()
             if self._resting is not None and self._resting.when() <= now_s:
                 await self._kill()
+                await self._forks.rest()
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""

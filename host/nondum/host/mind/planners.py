@@ -67,10 +67,15 @@ class Planners:
 
     @classmethod
     def of(
-        cls, found: Mapping[str, str], *, memory_mb: int, temporary: Path | None = None
+        cls,
+        found: Mapping[str, str],
+        *,
+        memory_mb: int,
+        temporary: Path | None = None,
+        stays: bool = True,
     ) -> Planners:
-        """Planners by name: `module:Class`."""
-        forks = planner_forks()
+        """Planners by name: `module:Class`; whether what they are forked from `stays`."""
+        forks = planner_forks(stays=stays)
         processes = [
             PlannerProcess(name, found[name], forks, memory_mb=memory_mb, temporary=temporary)
             for name in sorted(found)
