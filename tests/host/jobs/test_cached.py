@@ -15,6 +15,7 @@ from tests.kit.host import LAMP, HostInProcess, host_in_process
 from tests.kit.lamp_drive import code, lamp, told
 from tests.kit.payloads import Part, make_payload
 from tests.kit.signing import Key, sign_payload, trust_of
+from tests.kit.until import until_async
 
 from nondum.host.core.events.payloads import PayloadActivated, PayloadCached, PayloadCopied
 from nondum.host.core.records.step import Step
@@ -225,5 +226,5 @@ async def test_what_has_no_place_in_the_store_any_more_is_not_cached(tmp_path: P
         key = (await host.until_step(LAMP_ID, Step.ACTIVE)).key
         host.pull()
         await host.until_gone(LAMP_ID)
-        await host.executor.installation.fill_cache(key)
-        assert not (host.folders.cache / key).exists()
+        cached = host.folders.cache / key
+        await until_async("no longer cached", lambda: not cached.exists())
