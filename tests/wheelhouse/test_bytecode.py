@@ -148,7 +148,7 @@ def test_what_the_host_has_compiled_by_hash_is_taken_too(tmp_path: Path, mode: s
 
 
 def test_modules_that_the_host_has_compiled_of_other_bytes_are_compiled(tmp_path: Path) -> None:
-    """Those of its own have been written since."""
+    """The host has another module by now."""
     host, wheel = Host(tmp_path, a=b"x = 1\n" + WHERE), tmp_path / "wheel"
     source = b"x = 3\n" + WHERE
     before = (host.root / "a.py").stat()
