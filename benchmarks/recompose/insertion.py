@@ -7,6 +7,7 @@ installed, its worker started and asked what it is, and the catalogue committed 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import socket
 import struct
@@ -75,9 +76,11 @@ def insert(robot: Robot, drive: Path, component: str, goal: str) -> Insertion:
 
 
 def remove(robot: Robot, drive: Path) -> None:
-    """Pull a drive and wait until nothing of it is left but the wheels in the store."""
+    """Pull a drive and wait until all is done that a host does in its idle moments afterwards: it
+    has the wheels in its store, and what it made of them in its cache."""
     robot.pull(drive.name)
     _await(lambda: not robot.ask("status")["payloads"], f"{drive.name} is not forgotten")
+    _await(lambda: _is_cached(robot), f"{drive.name} is not cached")
     await_rest(daemon(robot), timeout_s=TIMEOUT_S)
 
 
@@ -99,16 +102,25 @@ def _await(is_done: Callable[[], bool], otherwise: str) -> None:
 
 
 def _is_compiled(robot: Robot) -> bool:
-    """Whether the venvs have compiled modules, which come last.
+    """Whether all that the store has is compiled, as far as it can be: that comes last."""
+    _hasten(robot)
+    manifests = [*(robot.work / "state/store").glob("[!.]*/manifest.json")]
+    return bool(manifests) and all(json.loads(m.read_bytes())["compiled"] for m in manifests)
 
-    Raises the priority of the processes that compile them: hosts leave it to idle moments, which
-    a machine that has other work may not have for minutes.
-    """
+
+def _is_cached(robot: Robot) -> bool:
+    """Whether the venvs of what was pulled are made."""
+    _hasten(robot)
+    return next((robot.work / "state/cache").glob("*/venvs/[!.]*"), None) is not None
+
+
+def _hasten(robot: Robot) -> None:
+    """Raise the priority of what a host leaves to idle moments, which a machine that has other work
+    may not have for minutes."""
     for pid in descendants(daemon(robot)):
         with contextlib.suppress(OSError):  # it has just ended, or it may not be done
             if os.sched_getscheduler(pid) == os.SCHED_IDLE:
                 os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
-    return next((robot.work / "state/venvs").rglob("*.pyc"), None) is not None
 
 
 def daemon(robot: Robot) -> int:

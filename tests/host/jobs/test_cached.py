@@ -201,6 +201,32 @@ async def test_what_was_touched_is_installed_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.anyio
+async def test_what_could_not_be_restored_stays_cached(tmp_path: Path) -> None:
+    """A drive that is pulled again at once, say."""
+    drive = lamp_drive(tmp_path)
+    async with host_in_process(tmp_path, timing=QUICK) as host:
+        key = await put_away(host, drive)
+        signature = drive / "nondum" / LAMP_ID / "CONTENTS.sig"
+        signature.mkdir()
+        host.plug(drive)
+        await host.until(lambda: is_refused(host))
+        host.pull()
+        await host.until_gone(LAMP_ID)
+        signature.rmdir()
+        made = host.folders.cache / key / "venvs/lamp"
+        inode = made.stat().st_ino
+        host.plug(drive)
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        (component,) = host.snapshot.components
+        assert component.venv.stat().st_ino == inode
+
+
+def is_refused(host: HostInProcess) -> bool:
+    record = host.payload(LAMP_ID)
+    return record is not None and record.step is Step.REFUSED
+
+
+@pytest.mark.anyio
 async def test_next_daemon_begins_with_an_empty_cache(tmp_path: Path) -> None:
     async with host_in_process(tmp_path, timing=QUICK) as host:
         await put_away(host, lamp_drive(tmp_path))
@@ -228,3 +254,4 @@ async def test_what_has_no_place_in_the_store_any_more_is_not_cached(tmp_path: P
         await host.until_gone(LAMP_ID)
         cached = host.folders.cache / key
         await until_async("no longer cached", lambda: not cached.exists())
+        assert not Store(host.folders.store).listing()

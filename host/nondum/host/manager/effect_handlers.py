@@ -122,8 +122,6 @@ class Executor:
         """Set an effect going."""
         instead = isinstance(effect, _INSTEAD)
         self._queues.add(_queue_of(effect), partial(self._carry_out, effect), instead=instead)
-        if isinstance(effect, effects.ClearPayload):
-            self._want_prune()
 
     async def close(self) -> None:
         """Give up what is being done, unmount drives, end children. Workers are their owner's."""
@@ -142,6 +140,8 @@ class Executor:
             reported = _failure(effect, _translated(effect, error))
         for event in reported:
             self._emit(event)
+        if isinstance(effect, effects.ClearPayload):  # nothing uses its wheels now
+            self._want_prune()
 
     def _urgent(self, effect: Effect) -> contextlib.AbstractContextManager[None]:
         can_wait = isinstance(effect, effects.CompileWheels)

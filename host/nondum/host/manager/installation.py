@@ -168,8 +168,8 @@ class Installation:
         key = effect.payload
         if (restored := self._restored.pop(key, None)) is not None:
             await in_thread(disk.sync_files, self._folders.payload(key))
-            made = self._parsed(key, restored, effect.renamed)
-            self._installed[key] = made
+            self._installed[key] = made = self._parsed(key, restored, effect.renamed)
+            self._promise(made)
         else:
             made = await self._install(key, effect.renamed, admit_beside=effect.beside)
         return (WheelsStored(key, made.fresh),)
@@ -323,17 +323,19 @@ class Installation:
         not as it was."""
         key = effect.payload
         async with self._store:
-            arguments = self._arguments(
-                folder=str(effect.folder),
-                digest=effect.digest,
-                headroom=await self._reservations.headroom(key, effect.beside),
-            )
-            run = partial(self._run, "restore", key, stall_s=COPY_SILENCE_S)
-            with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
-                restored = await self._cache.restore(key, run, arguments, staging)
-            if restored is None:
+            if (told := self._cache.has(key)) is None:  # it is pulled and back in no time
+                await in_thread(self._cache.drop, key)
                 return None
-            self._promise(self._parsed(key, restored, {}))
+            headroom = await self._reservations.headroom(key, effect.beside)
+            self._promise(self._parsed(key, told, {}))  # before others ask what there is
+        arguments = self._arguments(
+            folder=str(effect.folder), digest=effect.digest, headroom=headroom
+        )
+        run = partial(self._run, "restore", key, stall_s=COPY_SILENCE_S)
+        with stalls_as_drive_gone(effect.drive, COPY_SILENCE_S):
+            restored = await self._cache.restore(key, run, arguments, staging)
+        if restored is None:
+            return None
         self._restored[key] = restored
         known: int = restored["known"]
         return known

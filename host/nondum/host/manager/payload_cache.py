@@ -44,7 +44,8 @@ class CachedPayload:
 
 
 class PayloadCache:
-    """Payload → what is cached of it. Nothing else may write to the store meanwhile."""
+    """Payload → what is cached of it. Nothing else may write to the store meanwhile, but during
+    `restore`."""
 
     def __init__(self, folders: Folders, children: Children) -> None:
         self._folders, self._children = folders, children
@@ -88,25 +89,31 @@ class PayloadCache:
             await in_thread(self.drop, next(iter(self._cached)))
         return True
 
+    def has(self, key: str) -> Mapping[str, Any] | None:
+        """What `install` told of a payload whose venvs are made."""
+        cached = self._cached.get(key)
+        return cached.told if cached and cached.stamp else None
+
     async def restore(
         self, key: str, run: Run, arguments: Mapping[str, Any], staging: Path
     ) -> dict[str, Any] | None:
         """Move a payload's files to staging, its venvs where workers find them, once it is judged
         as if it were copied: what `install` would tell, and the `known` bytes.
 
-        None: it is not as it was, and dropped. `run` does the job. Raises what that does, and
-        `OSError`.
+        None: it is not as it was, and deleted. `run` does the job; if it fails, all stays cached.
+        Raises what that does, and `OSError`.
         """
-        if (cached := self._cached.get(key)) is None:
-            return None
+        cached = self._cached.pop(key)  # so that it gives way to none meanwhile
         places = {"cached_folder": str(cached.folder), "cached_venvs": str(cached.venvs)}
-        told = None
-        if cached.stamp:
+        try:
             told = await run({**arguments, **places, "stamp": cached.stamp})
+        except BaseException:
+            self._cached[key] = cached
+            raise
         if told is not None:
             await in_thread(move, cached.folder, staging)
             await in_thread(move, cached.venvs, self._folders.venvs(key))
-        await in_thread(self.drop, key)
+        await in_thread(remove, self._folders.cache / key)
         return None if told is None else {**cached.told, **told}
 
     def drop(self, key: str) -> None:
