@@ -19,6 +19,8 @@ allow_unsigned = true
 look_s = 60.0
 [peers]
 enabled = {has_peers}
+[planning]
+establish_s = 300
 [workers]
 startup_s = 200
 """
