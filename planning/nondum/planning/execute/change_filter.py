@@ -19,16 +19,16 @@ class Narrow:
     """A world without what does not matter. Satisfies `running.World`."""
 
     world: World
+    whole: frozenset[str]
+    """What holds in it."""
     matter: frozenset[str]
-
-    @property
-    def facts(self) -> frozenset[str]:
-        """What matters and holds."""
-        return self.matter & self.world.facts
+    facts: frozenset[str]
+    """What matters and holds."""
 
     def facts_without(self, ended: Collection[str]) -> frozenset[str]:
         """What matters and would hold."""
-        return self.matter & self.world.facts_without(ended)
+        left = self.world.facts_without(ended)
+        return self.facts if left is self.whole else self.matter & left
 
 
 class ChangeFilter:
@@ -38,12 +38,16 @@ class ChangeFilter:
         """`steps` are those of the plan, and those that run without being in it."""
         named = goal.union(*(s.precondition | s.add | s.delete for s in steps))
         self._matter = named.union(twin(fact) for fact in named if is_twin(fact))
+        self._narrow: Narrow | None = None
         self._seen: frozenset[str] | None = None
         self._glimpse: Glimpse | None = None
 
     def narrowed(self, world: World) -> World:
         """The world as far as it matters."""
-        return Narrow(world, self._matter)
+        narrow, whole = self._narrow, world.facts
+        if narrow is None or narrow.world is not world or narrow.whole is not whole:
+            narrow = self._narrow = Narrow(world, whole, self._matter, self._matter & whole)
+        return narrow
 
     def keep(self, world: World, established: Collection[str], *, closely: bool) -> None:
         """Remember the world as it is. `closely`: any other fact will be a change."""

@@ -37,6 +37,16 @@ class PartialOrder:
     after: tuple[int, ...]
     """For each step, the mask of all steps that must come after it."""
 
+    def with_later(self, steps: int) -> int:
+        """The steps of a set, and those that must come after one of them."""
+        later, left = steps, steps
+        while left:
+            low = left & -left
+            more = self.after[low.bit_length() - 1]
+            later |= more
+            left &= ~(more | low)
+        return later
+
     def first_of(self, steps: int) -> Iterator[int]:
         """The steps of a set that wait for no other of the set, in the plan's order."""
         while steps:

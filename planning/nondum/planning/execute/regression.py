@@ -21,6 +21,9 @@ from nondum.planning.execute.partial_order import (
 from nondum.planning.execute.step import Step
 from nondum.sdk.frozen import frozen
 
+_NO, _YES = b"01"
+"""Digits of a set of steps, as it is gathered."""
+
 
 @frozen
 class Rest:
@@ -59,23 +62,35 @@ class Regression:
             self._needs_of[link.consumer].append(link)
             if link.provider is not None:
                 self._uses_of[link.provider].append(link)
+        # Ready for `rest`, which goes through most of a plan each time that something happens.
+        self._sources = [
+            [(link.fact, link.provider, link) for link in self._needs_of[step]]
+            for step in (*range(len(self.steps)), GOAL)  # the last one of a list has index -1, too
+        ]
 
     def rest(self, facts: Set[str]) -> Rest | Stuck:
         """The least rest of the plan that `facts` support."""
-        todo = 0
         missing: list[CausalLink] = []
-        pending = list(self._needs_of[GOAL])
-        while pending:
-            link = pending.pop()
-            if link.fact in facts:
-                continue
-            if link.provider is None:
-                missing.append(link)
-            elif not todo >> link.provider & 1:
-                fresh = (1 << link.provider | self.order.after[link.provider]) & ~todo
-                todo |= fresh
-                for index in bits(fresh):
-                    pending += self._needs_of[index]
+        left = bytearray(b"0" * len(self.steps))
+        sources = self._sources
+        pending = list(sources[GOAL])
+        while True:
+            while pending:
+                fact, provider, link = pending.pop()
+                if fact in facts:
+                    continue
+                if provider is None:
+                    missing.append(link)
+                elif left[provider] == _NO:
+                    left[provider] = _YES
+                    pending += sources[provider]
+            todo = int(left[::-1] or b"0", 2)
+            fresh = self.order.with_later(todo) & ~todo
+            if not fresh:
+                break
+            for index in bits(fresh):
+                left[index] = _YES
+                pending += sources[index]
         if missing:
             missing.sort(key=lambda link: (link.consumer, link.fact))
             return Stuck(tuple(missing), todo)
@@ -83,12 +98,13 @@ class Regression:
 
     def needs(self, todo: int) -> frozenset[str]:
         """What a rest needs from outside itself."""
-        consumers = (GOAL, *bits(todo))
+        left = f"{todo:0{len(self.steps)}b}"[::-1]
+        groups = [self._sources[index] for index, is_left in enumerate(left) if is_left == "1"]
         return frozenset(
-            link.fact
-            for consumer in consumers
-            for link in self._needs_of[consumer]
-            if link.provider is None or not todo >> link.provider & 1
+            fact
+            for group in (*groups, self._sources[GOAL])
+            for fact, provider, _ in group
+            if provider is None or left[provider] == "0"
         )
 
     def needs_of(self, step: int) -> tuple[CausalLink, ...]:
