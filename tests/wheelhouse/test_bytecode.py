@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -91,77 +90,3 @@ def test_files_that_a_wheel_brings_stay(tmp_path: Path, path: str) -> None:
     files = stored(tmp_path / "files", a=b"A = 1")
     taken = StoredFile(path, 1, "0" * 64)
     assert bytecode.write(tmp_path / "files", [*files, taken], tmp_path / "out") == ()
-
-
-class Host:
-    """A folder of modules that an interpreter imports from, and has compiled."""
-
-    def __init__(self, root: Path, **sources: bytes) -> None:
-        self.root, self.files = root / "host", stored(root / "host", **sources)
-        run = "import sys; sys.path.insert(0, sys.argv[1]); " + "; ".join(
-            f"import {name}" for name in sources
-        )
-        subprocess.run([sys.executable, "-I", "-c", run, str(self.root)], check=True)
-
-    def known_of(self, wheel: Path, files: list[StoredFile]) -> list[str] | None:
-        done = bytecode.write_known(wheel, files, [str(wheel.parent / "nowhere"), str(self.root)])
-        return None if done is None else [file.path for file in done]
-
-
-def says(root: Path, module: str) -> str:
-    """What an interpreter that may not write finds in a module, which is not its source any more:
-    where it says it is, and its value."""
-    (root / f"{module}.py").write_text("raise SystemExit")
-    run = f"import sys; sys.path.insert(0, sys.argv[1]); from {module} import *; print(where(), x)"
-    command = [sys.executable, "-I", "-B", "-c", run, str(root)]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-
-
-WHERE = b"def where(): return where.__code__.co_filename"
-
-
-def test_modules_that_the_host_has_are_compiled_as_they_are_stored(tmp_path: Path) -> None:
-    source = b"x = 1\n" + WHERE
-    host = Host(tmp_path, a=source)
-    wheel = tmp_path / "wheel"
-    files = stored(wheel, a=source)
-    assert host.known_of(wheel, files) == [bytecode.cached("a.py")]
-    assert says(wheel, "a") == f"{wheel}/a.py 1"
-
-
-@pytest.mark.parametrize("mode", ["checked-hash", "unchecked-hash"])
-def test_what_the_host_has_compiled_by_hash_is_taken_too(tmp_path: Path, mode: str) -> None:
-    source = b"x = 2\n" + WHERE
-    host, wheel = Host(tmp_path, a=source), tmp_path / "wheel"
-    command = [
-        sys.executable,
-        "-m",
-        "compileall",
-        "-qf",
-        "--invalidation-mode",
-        mode,
-        str(host.root),
-    ]
-    subprocess.run(command, check=True)
-    assert host.known_of(wheel, stored(wheel, a=source))
-    assert says(wheel, "a") == f"{wheel}/a.py 2"
-
-
-def test_modules_that_the_host_has_compiled_of_other_bytes_are_compiled(tmp_path: Path) -> None:
-    """The host has another module by now."""
-    host, wheel = Host(tmp_path, a=b"x = 1\n" + WHERE), tmp_path / "wheel"
-    source = b"x = 3\n" + WHERE
-    before = (host.root / "a.py").stat()
-    (host.root / "a.py").write_bytes(source)
-    os.utime(host.root / "a.py", ns=(before.st_atime_ns, before.st_mtime_ns + 10**9))
-    assert host.known_of(wheel, stored(wheel, a=source))
-    assert says(wheel, "a") == f"{wheel}/a.py 3"
-
-
-def test_wheel_with_one_module_that_the_host_has_not_is_left_to_be_compiled(tmp_path: Path) -> None:
-    host = Host(tmp_path, a=b"x = 1", b=b"y = 1")
-    assert host.known_of(tmp_path / "one", stored(tmp_path / "one", a=b"x = 1", b=b"y = 2")) is None
-    assert host.known_of(tmp_path / "two", stored(tmp_path / "two", a=b"x = 1", c=b"z = 1")) is None
-    assert host.known_of(tmp_path / "three", stored(tmp_path / "three")) is None
-    for name in ("one", "two"):
-        assert not list((tmp_path / name).rglob("*.pyc"))

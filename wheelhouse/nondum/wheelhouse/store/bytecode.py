@@ -7,12 +7,10 @@ strangers wrote: do it in a process that may die.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib.util
 import marshal
 import os
-import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -26,8 +24,6 @@ TAG = sys.implementation.cache_tag or ""
 FOLDER = "__pycache__"
 _UNCHECKED_HASH = (0b01).to_bytes(4, "little")
 """Flags of PEP 552: there is a hash of the source, and the interpreter need not check it."""
-_HEADER = 16
-"""Bytes of a compiled file before its code: magic number, flags, hash or time and size."""
 _UNCOMPILABLE = (SyntaxError, ValueError, ArithmeticError, RuntimeError, SystemError, MemoryError)
 """What the compiler raises: templates, other versions' syntax, null bytes, too deep nesting."""
 
@@ -82,57 +78,6 @@ def write(
         if progress is not None:
             progress(file.size)
     return tuple(done)
-
-
-def write_known(
-    root: Path, files: Sequence[StoredFile], path: Sequence[str] | None = None
-) -> tuple[StoredFile, ...] | None:
-    """Write the compiled files of a wheel beside its modules if each module, to the byte, is one
-    that this interpreter would import (from `path`, by default its own): most workers run the very
-    SDK that their host has, and need not compile it. None: one is not, or there are none.
-
-    Raises `OSError`.
-    """
-    known = []
-    for file in _modules(files):
-        if (source := _same_here(file, sys.path if path is None else path)) is None:
-            return None
-        known.append((file.path, source))
-    if not known:
-        return None
-    done = []
-    for path_, source in known:
-        text = source.read_bytes()
-        data = _compiled_here(source, text) or compiled(text, path_)
-        if data is not None:
-            done.append(_write(root, cached(path_), data))
-    return tuple(done)
-
-
-def _same_here(file: StoredFile, path: Sequence[str]) -> Path | None:
-    """The module's file in this interpreter's own environment, if it has the same bytes."""
-    for entry in path:
-        source = Path(entry, file.path)
-        with contextlib.suppress(OSError):
-            if source.stat().st_size == file.size:
-                is_same = hashlib.sha256(source.read_bytes()).hexdigest() == file.sha256
-                return source if is_same else None
-    return None
-
-
-def _compiled_here(source: Path, text: bytes) -> bytes | None:
-    """What this interpreter has compiled of a module, if that is of these bytes (PEP 552)."""
-    try:
-        data = Path(importlib.util.cache_from_source(str(source), optimization="")).read_bytes()
-        status = source.stat()
-    except OSError:
-        return None
-    magic, flags, said = data[:4], data[4:8], data[8:_HEADER]
-    hashed = importlib.util.source_hash(text)
-    dated = struct.pack("<II", int(status.st_mtime) & 0xFFFFFFFF, status.st_size & 0xFFFFFFFF)
-    if magic != importlib.util.MAGIC_NUMBER or said != (hashed if flags[0] else dated):
-        return None
-    return magic + _UNCHECKED_HASH + hashed + data[_HEADER:]
 
 
 def _modules(files: Sequence[StoredFile]) -> Iterator[StoredFile]:

@@ -5,8 +5,8 @@
         files/…            site-packages as this wheel fills it, compiled files beside the modules
 
 A wheel is hashed and unpacked from the same bytes, synced to disk, and renamed in: what is there
-is whole. Most compiled files come later; those that the manifest tells of are there and whole.
-Before files are used again they are hashed again. Venvs are hard links to them.
+is whole. Compiled files come later; those that the manifest tells of are there and whole. Before
+files are used again they are hashed again. Venvs are hard links to them.
 """
 
 from __future__ import annotations
@@ -201,16 +201,10 @@ class Store:
         return stored
 
     def _told(self, source: Source, unpacked: Unpacked) -> StoredWheel:
-        """Write the manifest of an unpacked wheel, and what is known to be compiled of it."""
+        """Write the manifest of an unpacked wheel."""
         folder = self.root / source.sha256
-        known = bytecode.write_known(source.root, unpacked.files)
         wheel = StoredWheel(
-            source.sha256,
-            source.path.name,
-            folder,
-            unpacked.files,
-            unpacked.left_out,
-            () if known is None else (CompiledFiles(bytecode.TAG, known),),
+            source.sha256, source.path.name, folder, unpacked.files, unpacked.left_out
         )
         manifest = self._unfinished(source.sha256) / MANIFEST
         manifest.write_text(wheel.manifest(), encoding="utf-8")
