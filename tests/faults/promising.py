@@ -24,7 +24,7 @@ from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.core.records.safety import Safety
 from nondum.host.jobs import install as install_job
 from nondum.host.lifecycle import rebuilding
-from nondum.host.manager import state_folders
+from nondum.host.manager import installation, state_folders
 from nondum.host.manager.crash_loop import CrashCounter
 from nondum.host.manager.state_folders import Folders
 from nondum.host.peers.placement.pins import Pins
@@ -130,6 +130,7 @@ def install(folders: Folders, elsewhere: Path) -> None:
     for stored in store.listing():
         promise(Kind.WHOLE, stored.folder)
     _install(folders, elsewhere, "known", "store")
+    _restore(folders, elsewhere, "restored")
     first = store.listing()[0]
     store.compile(first.sha256)
     promise(Kind.SAFE, first.folder)
@@ -137,6 +138,15 @@ def install(folders: Folders, elsewhere: Path) -> None:
     note = folders.note("known")
     rebuilding.write_note(note, "a", folders.payloads / "known")
     promise(Kind.WHOLE, note)
+
+
+def _restore(folders: Folders, elsewhere: Path, key: str) -> None:
+    staged = shutil.copytree(lamp(elsewhere / key / "drive"), folders.root / "staging" / key)
+    shutil.rmtree(staged / "wheels")
+    kept = folders.payloads / key
+    state_folders.move(staged, kept)
+    installation._sync(kept)
+    promise(Kind.SAFE, kept)
 
 
 def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:

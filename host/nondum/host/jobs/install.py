@@ -104,6 +104,7 @@ def _sync(folder: Path, *, with_wheels: bool) -> None:
     if with_wheels and wheels.exists():
         disk.sync_files(wheels)
     disk.sync_files(folder)
+    disk.sync(folder.parent)
 
 
 def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:

@@ -167,7 +167,7 @@ class Installation:
         """Fill the store and make the venvs, unless they were cached."""
         key = effect.payload
         if (restored := self._restored.pop(key, None)) is not None:
-            await in_thread(disk.sync_files, self._folders.payload(key))
+            await in_thread(_sync, self._folders.payload(key))
             self._installed[key] = made = self._parsed(key, restored, effect.renamed)
             self._promise(made)
         else:
@@ -393,6 +393,12 @@ class Installation:
             **self._trust.arguments,
             **more,
         }
+
+
+def _sync(folder: Path) -> None:
+    """Have a payload's checked files on disk; its signature may be new, and its place is."""
+    disk.sync_files(folder)
+    disk.sync(folder.parent)
 
 
 def _remove_all(folders: Iterable[Path]) -> None:

@@ -63,8 +63,8 @@ def sync(path: Path) -> None:
 
 
 def sync_files(folder: Path) -> None:
-    """Have the files in a folder on disk, the folder itself, and that it is there."""
-    for path in (*(path for path in folder.iterdir() if path.is_file()), folder, folder.parent):
+    """Have the files in a folder on disk, and the folder."""
+    for path in (*(path for path in folder.iterdir() if path.is_file()), folder):
         sync(path)
 
 
