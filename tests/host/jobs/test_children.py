@@ -237,12 +237,16 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
         assert not pool.pids()
 
 
+@pytest.mark.parametrize("aside", [False, True])
 async def test_fork_server_that_does_not_stay_ends_after_the_last_child(
-    tmp_path: Path, clock: VirtualClock
+    tmp_path: Path, clock: VirtualClock, aside: bool
 ) -> None:
     pool = Children(stays=False)
     try:
-        await pool.run("look", drive(tmp_path), owner="a")
+        if aside:
+            await pool.run_aside("look", drive(tmp_path))
+        else:
+            await pool.run("look", drive(tmp_path), owner="a")
         assert pool.server is not None
         with process_ended(pool.server) as ended:
             await clock.advance(QUIET_S)

@@ -155,6 +155,7 @@ class Children:
             return unpacked(await child.do(job, arguments, stall_s))
         finally:
             await self._end(child)
+            self._tend()
 
     async def release(self, owner: str) -> None:
         """End the child that is kept for an owner whose work is done."""
