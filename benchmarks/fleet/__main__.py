@@ -2,7 +2,7 @@
 
 Every host is a separate process, all on this machine over loopback: by mesh (CURVE, every host
 linked to every other) and by way of a Zenoh router (a process more, no encryption). All start, and
-wait; then they are told of each other at one moment. Measured until every one of them has every
+wait; then each is given the addresses of the others. Measured until every one of them has every
 other's catalogue of 10 kB; then for some seconds of quiet, and one change that all must hear of.
 In the mesh, hosts are then stopped and killed, while all are quiet and while all tell changes: how
 long until all others know, and whether a live one was taken for dead meanwhile.

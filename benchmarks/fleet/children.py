@@ -16,7 +16,7 @@ TOGETHER = 8
 
 @dataclass
 class Child:
-    """A process that does as it is told."""
+    """A process that reads commands, one a line."""
 
     process: subprocess.Popen[str]
     name: str

@@ -1,4 +1,4 @@
-"""A process that is one host, or the router: `host KIND CONFIG`. It is told what to do line by
+"""A process that is one host, or the router: `host KIND CONFIG`. It reads commands line by
 line, and tells what that took."""
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def usage() -> dict[str, Any]:
 
 
 async def be_host(kind: str, config: dict[str, Any]) -> None:
-    """One host: told what to do line by line, and tells what it took."""
+    """One host: reads commands line by line, and prints what it took."""
     loop, watching = asyncio.get_running_loop(), Watching()
     keys = HostKeys(PeerKey(config["public"]), config["secret"])
     identity, trust = Identity(config["name"], keys), Trust(paired=config["trusted"])

@@ -35,7 +35,7 @@ def page(found: dict[tuple[str, int], list[Figures]], repeats: int) -> str:
 
 `python -m benchmarks.fleet` wrote this page. Every host is a separate process, all on this one
 machine over loopback, so that {max(hosts for _, hosts in found)} hosts share what each of them
-would have alone. All have started when they are told of each other at one moment; converged means
+would have alone. All have started when each is given the addresses of the others; converged means
 that every one has every other's catalogue (10 kB, ten entries). Bytes are those that TCP carried,
 the router's included; CPU is until then, the router's and ZeroMQ's threads included. In quiet, mesh
 links are pinged from both ends, every 0.3 s for up to 32 peers and every 1.8 s for 99; by way of

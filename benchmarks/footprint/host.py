@@ -62,13 +62,13 @@ def running(
             process.wait()
 
 
-def await_worker(pid: int, workers: int = 2) -> None:
-    """Wait until there are as many workers: that of the payload and, if there is one, the spare.
+def await_worker(pid: int) -> None:
+    """Wait until there are two workers: that of the payload, and the spare.
 
     Raises `TimeoutError`.
     """
     until = time.monotonic() + PATIENCE_S
-    while len(probe.memory(pid).get("worker", [])) < workers:
+    while len(probe.memory(pid).get("worker", [])) < 2:
         if time.monotonic() > until:
             raise TimeoutError("the payload has no worker")
         time.sleep(0.2)

@@ -84,10 +84,8 @@ def test_host_with_little_memory_keeps_nothing_ready(folder: Path) -> None:
     """What its children are forked from is there as it starts, and ends by itself."""
     with running(folder, ready_above_mb=10**9) as (pid, _):
         assert probe.memory(pid).keys() <= {"daemon", "drive child"}
-        make_payload(folder / "stick", talker())
-        (folder / "stick").rename(folder / "slots/stick")
-        await_worker(pid, workers=1)
-        assert len(probe.memory(pid)["worker"]) == 1
+    with running(folder) as (pid, _):
+        assert probe.memory(pid).keys() >= {"daemon", "worker"}
 
 
 def test_page_is_what_was_measured() -> None:

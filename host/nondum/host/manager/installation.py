@@ -323,7 +323,7 @@ class Installation:
         not as it was."""
         key = effect.payload
         async with self._store:
-            if (told := self._cache.has(key)) is None:  # it is pulled and back in no time
+            if (told := self._cache.told_of(key)) is None:  # it is pulled and back in no time
                 await in_thread(self._cache.drop, key)
                 return None
             headroom = await self._reservations.headroom(key, effect.beside)

@@ -89,7 +89,7 @@ class PayloadCache:
             await in_thread(self.drop, next(iter(self._cached)))
         return True
 
-    def has(self, key: str) -> Mapping[str, Any] | None:
+    def told_of(self, key: str) -> Mapping[str, Any] | None:
         """What `install` told of a payload whose venvs are made."""
         cached = self._cached.get(key)
         return cached.told if cached and cached.stamp else None
