@@ -89,6 +89,10 @@ class FollowedStream:
         rows = json.loads(host.machine.run("nondum streams --json"))
         (stream,) = [row["stream"] for row in rows if row["type"] == kind]
         self._log = f"/run/heard-{kind}"
+        self._read = 0
+        """Bytes of it; what was read is kept, since to read it again costs the machine more each
+        time."""
+        self._rows: list[dict[str, Any]] = []
         unit = f"heard-{kind}"
         self._machine.run(
             f"systemctl stop {unit} 2>/dev/null; rm -f {self._log};"
@@ -98,8 +102,11 @@ class FollowedStream:
 
     def rows(self) -> list[dict[str, Any]]:
         """All messages so far."""
-        lines = self._machine.run(f"cat {self._log}").split("\n")[:-1]
-        return [json.loads(line) for line in lines]
+        new, _, _ = self._machine.run(f"tail -c +{self._read + 1} {self._log}").rpartition("\n")
+        if new:
+            self._read += len(new.encode()) + 1
+            self._rows += map(json.loads, new.split("\n"))
+        return list(self._rows)
 
 
 def headings(rows: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
