@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 TOGETHER = 8
@@ -16,15 +16,18 @@ TOGETHER = 8
 
 @dataclass
 class Child:
-    """A process that reads commands, one a line."""
+    """A process that reads commands, one a line; its name is that of its first host."""
 
     process: subprocess.Popen[str]
     name: str
-    address: str = ""
+    addresses: list[str] = field(default_factory=list)
 
     def order(self, do: str, **more: Any) -> None:
+        self.say({"do": do, **more})
+
+    def say(self, what: Any) -> None:
         assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps({"do": do, **more}) + "\n")
+        self.process.stdin.write(json.dumps(what) + "\n")
         self.process.stdin.flush()
 
     def answer(self) -> dict[str, Any]:
@@ -38,14 +41,15 @@ def children(kinds: list[tuple[str, Any]]) -> Iterator[list[Child]]:
     with contextlib.ExitStack() as stack:
         started = []
         for kind, config in kinds:
-            command = [sys.executable, "-m", "benchmarks.fleet.host", kind, json.dumps(config)]
+            command = [sys.executable, "-m", "benchmarks.fleet.host", kind]
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
             )
             stack.enter_context(process)
             stack.callback(process.kill)
-            started.append(Child(process, config["name"] if kind != "router" else kind))
+            started.append(Child(process, config[0]["name"] if kind != "router" else kind))
+            started[-1].say(config)
             if len(started) % TOGETHER == 0 or len(started) == len(kinds):
                 for one in started[-TOGETHER:]:
-                    one.address = one.address or one.answer()["address"] or "-"
+                    one.addresses = one.addresses or one.answer()["addresses"]
         yield started

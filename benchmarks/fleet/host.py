@@ -1,34 +1,26 @@
-"""A process that is one host, or the router: `host KIND CONFIG`. It reads commands line by
-line, and tells what that took."""
+"""A process that is one host or several, or the router: `host KIND`. It reads what it is and then
+commands line by line, and tells what that took."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import itertools
 import json
-import os
 import random
-import socket
-import struct
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
-from benchmarks import measuring
+from benchmarks.fleet.bare import be_bare
+from benchmarks.fleet.told import CATALOGUE, NEWS, tell, usage
 
 from nondum.transport.fleet import Fleet, FleetEvent, Mesh, PeerChanged
 from nondum.transport.peers import HostKeys, Identity, IncomingCall, Lease, PeerKey, PeerLost, Trust
 from nondum_host_zenoh.fleet import ZenohFleet
 from nondum_host_zenoh.line import RouterAccess
 
-CATALOGUE = {f"component/{number}": {"text": "x" * 970} for number in range(10)}
-NEWS = {"component/9": {"text": "y" * 200}}
 BUSY_S = 1.0
 """Between two changes of every host while all are busy."""
-# struct tcp_info of linux/tcp.h: bytes_sent comes after 200 bytes.
-_TCP_INFO = struct.Struct("=200xQ")
 
 
 class Silent:
@@ -67,84 +59,70 @@ class Watching:
                 self.told.put_nowait("news")
 
 
-def duplicate(descriptor: int) -> socket.socket:
-    """The socket of a descriptor once more. Raises `OSError` where there is none."""
-    copy = os.dup(descriptor)
-    try:
-        return socket.socket(fileno=copy)
-    except OSError:
-        os.close(copy)
-        raise
+class Host:
+    """One host of a fleet."""
+
+    def __init__(self, kind: str, config: dict[str, Any]) -> None:
+        keys = HostKeys(PeerKey(config["public"]), config["secret"])
+        identity, trust = Identity(config["name"], keys), Trust(paired=config["trusted"])
+        self.watching = Watching()
+        self.watching.expected = len(config["trusted"]) - 1
+        self.fleet: Fleet
+        if kind == "mesh":
+            listen = ["tcp://127.0.0.1:0"]
+            hear = self.watching.hear
+            self.fleet = Mesh(identity, trust, Silent(), on_event=hear, listen=listen)
+        else:
+            access = RouterAccess("bench", (config["router"],))
+            hear = self.watching.hear
+            self.fleet = ZenohFleet(identity, trust, Silent(), access, on_event=hear)
+        self.fleet.publish(CATALOGUE)
+
+    async def listen(self) -> str:
+        """Where it can be met; empty by way of a router, where it is not to be seen yet."""
+        if not isinstance(self.fleet, Mesh):
+            return ""
+        await self.fleet.start()
+        return self.fleet.addresses[0]
+
+    async def meet(self, places: dict[str, str]) -> None:
+        """Meet all others, until all of their catalogues are here."""
+        if isinstance(self.fleet, Mesh):
+            for key, address in places.items():
+                self.fleet.meet(PeerKey(key), [address])
+        else:
+            await self.fleet.start()
+        await self.watching.told.get()
 
 
-def bytes_sent() -> int:
-    """What has left by all TCP connections that this process has."""
-    total = 0
-    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208  # numbers, not paths
-        with contextlib.suppress(OSError), duplicate(int(name)) as one:  # or none of TCP
-            info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
-            total += int(_TCP_INFO.unpack(info)[0])
-    return total
-
-
-def rss_mb() -> float:
-    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    return int(fields[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def usage() -> dict[str, Any]:
-    return {
-        "at_s": time.monotonic(),
-        "cpu_s": measuring.cpu_s(),
-        "sent": bytes_sent(),
-        "rss_mb": rss_mb(),
-    }
-
-
-async def be_host(kind: str, config: dict[str, Any]) -> None:
-    """One host: reads commands line by line, and prints what it took."""
-    loop, watching = asyncio.get_running_loop(), Watching()
-    keys = HostKeys(PeerKey(config["public"]), config["secret"])
-    identity, trust = Identity(config["name"], keys), Trust(paired=config["trusted"])
-    watching.expected = len(config["trusted"]) - 1
-    fleet: Fleet
-    if kind == "mesh":
-        fleet = Mesh(
-            identity, trust, Silent(), on_event=watching.hear, listen=["tcp://127.0.0.1:0"]
-        )
-    else:
-        access = RouterAccess("bench", (config["router"],))
-        fleet = ZenohFleet(identity, trust, Silent(), access, on_event=watching.hear)
-    fleet.publish(CATALOGUE)
-    if isinstance(fleet, Mesh):
-        await fleet.start()
-        tell({"address": fleet.addresses[0]})
-    else:
-        tell({"address": ""})
-    telling: asyncio.Task[None] | None = None
+async def be_hosts(kind: str, configs: list[dict[str, Any]]) -> None:
+    """Some hosts, which all do as told, but for what is published: that is the first one's."""
+    loop = asyncio.get_running_loop()
+    hosts = [Host(kind, config) for config in configs]
+    tell({"addresses": [await host.listen() for host in hosts]})
+    telling: list[asyncio.Task[None]] = []
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         order = json.loads(line)
         match order["do"]:
             case "meet":
-                if isinstance(fleet, Mesh):
-                    for key, address in order["places"].items():
-                        fleet.meet(PeerKey(key), [address])
-                else:
-                    await fleet.start()
-                await watching.told.get()
-                tell(usage() | {"lost": watching.lost})
+                await asyncio.gather(*(host.meet(order["places"]) for host in hosts))
+                tell(_taken(hosts))
             case "look":
-                tell(usage() | {"lost": watching.lost})
+                tell(_taken(hosts))
             case "be busy":
-                telling = asyncio.create_task(tell_changes(fleet))
+                telling = [asyncio.create_task(tell_changes(host.fleet)) for host in hosts]
             case "rest":
-                assert telling is not None
-                telling.cancel()
+                for task in telling:
+                    task.cancel()
             case "publish":
-                fleet.publish(NEWS)
+                hosts[0].fleet.publish(NEWS)
             case "hear":
-                await watching.told.get()
-                tell(usage())
+                await asyncio.gather(*(host.watching.told.get() for host in hosts))
+                tell(_taken(hosts))
+
+
+def _taken(hosts: list[Host]) -> dict[str, Any]:
+    return usage() | {"lost": [lost for host in hosts for lost in host.watching.lost]}
 
 
 async def tell_changes(fleet: Fleet) -> None:
@@ -167,18 +145,17 @@ def be_router(endpoint: str) -> None:
     }.items():
         config.insert_json5(name, json.dumps(value))
     with zenoh.open(config):
-        tell({"address": endpoint})
+        tell({"addresses": [endpoint]})
         while sys.stdin.readline():
             tell(usage())
 
 
-def tell(what: dict[str, Any]) -> None:
-    print(json.dumps(what), flush=True)
-
-
 if __name__ == "__main__":
-    kind, config = sys.argv[1:]
+    (kind,) = sys.argv[1:]
+    config = json.loads(sys.stdin.readline())
     if kind == "router":
-        be_router(json.loads(config))
+        be_router(config)
+    elif kind == "bare":
+        be_bare(*config)
     else:
-        asyncio.run(be_host(kind, json.loads(config)))
+        asyncio.run(be_hosts(kind, config))

@@ -92,30 +92,30 @@ def _known_to(node: Child, name: str, at_s: float) -> float:
         time.sleep(SEEN_S)
 
 
-def measure(kind: str, hosts: int) -> Figures:
+def measure(kind: str, hosts: int, together: int = 1) -> Figures:
+    """One repeat, with this number of hosts `together` in each process."""
     keys = [HostKeys.generate() for _ in range(hosts)]
     trusted = {pair.public: f"host-{number}" for number, pair in enumerate(keys)}
     with socket.create_server(("127.0.0.1", 0)) as free:
         router = f"tcp/127.0.0.1:{free.getsockname()[1]}"
-    configs: list[tuple[str, Any]] = [
-        (
-            kind,
-            {
-                "name": trusted[pair.public],
-                "public": pair.public,
-                "secret": pair.secret,
-                "trusted": trusted,
-                "router": router,
-            },
-        )
+    configs = [
+        {
+            "name": trusted[pair.public],
+            "public": pair.public,
+            "secret": pair.secret,
+            "trusted": trusted,
+            "router": router,
+        }
         for pair in keys
     ]
+    processes = [(kind, configs[at : at + together]) for at in range(0, hosts, together)]
     with contextlib.ExitStack() as stack:
         relays = []
         if kind == "zenoh":
             relays = stack.enter_context(children([("router", router)]))
-        nodes = stack.enter_context(children(configs))
-        places = {pair.public: node.address for pair, node in zip(keys, nodes, strict=True)}
+        nodes = stack.enter_context(children(processes))
+        addresses = [address for node in nodes for address in node.addresses]
+        places = {pair.public: at for pair, at in zip(keys, addresses, strict=True)}
         everybody = [*nodes, *relays]
         before = _all(everybody, lambda node: node.order("look"))
         begun_s = time.monotonic()
@@ -134,7 +134,7 @@ def measure(kind: str, hosts: int) -> Figures:
         publisher = nodes[0].answer()
         silence = (quiet[0]["sent"] - after[0]["sent"]) / (quiet[0]["at_s"] - after[0]["at_s"])
         took_s, dead, last = (
-            strike(nodes) if has_deaths(kind, hosts) else ({}, set(), quiet[:hosts])
+            strike(nodes) if has_deaths(kind, hosts) else ({}, set(), quiet[: len(nodes)])
         )
         why = Counter(why for one in last for _, name, why in one["lost"] if name not in dead)
         noise = silence * (publisher["at_s"] - quiet[0]["at_s"])
@@ -142,7 +142,7 @@ def measure(kind: str, hosts: int) -> Figures:
             converged_s=max(one["at_s"] for one in met) - begun_s,
             sent_kb=_grown("sent", before, after) / hosts / 1000,
             cpu_ms=_grown("cpu_s", before, after) / hosts * 1000,
-            rss_mb=sum(one["rss_mb"] for one in after[:hosts]) / hosts,
+            rss_mb=sum(one["rss_mb"] for one in after[: len(nodes)]) / hosts,
             quiet_percent=100
             * _grown("cpu_s", after, quiet)
             / hosts

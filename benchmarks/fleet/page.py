@@ -23,15 +23,19 @@ COLUMNS = {
 
 
 def page(found: dict[tuple[str, int], list[Figures]], repeats: int) -> str:
-    named = {"mesh": "mesh, CURVE", "zenoh": "Zenoh router"}
+    named = {
+        "mesh": "mesh, CURVE",
+        "bare": "bare ZeroMQ, CURVE",
+        "zenoh": "Zenoh router",
+    }
     rows = []
     for (kind, hosts), figures in found.items():
         spreads = (
             format(Spread(tuple(float(getattr(one, field)) for one in figures)), style)
             for field, style in COLUMNS.values()
         )
-        rows.append([str(hosts), named[kind], *spreads])
-    return f"""# Hosts that meet: mesh against a Zenoh router
+        rows.append([str(hosts), named.get(kind, kind), *spreads])
+    return f"""# Hosts that meet: mesh, bare ZeroMQ, Zenoh router
 
 `python -m benchmarks.fleet` wrote this page. Every host is a separate process, all on this one
 machine over loopback, so that {max(hosts for _, hosts in found)} hosts share what each of them
@@ -42,7 +46,10 @@ links are pinged from both ends, every 0.3 s for up to 32 peers and every 1.8 s 
 the router, hosts tell their state every 3 s.
 Then one entry of 200 bytes changes: until the last host has it, and what the one that told it has
 sent. Live hosts that were taken for dead by another are counted until the end, deaths included. The
-mesh is encrypted and every host proves its key; the router's links here are not.
+mesh is encrypted and every host proves its key; the router's links here are not. Bare ZeroMQ is
+what the mesh is made of: the same sockets and keys, each catalogue sent once over each link, and
+nothing else: no host is kept out, pinged, found dead, or told again what was missed. *Simulated*
+hosts share processes, so their memory and the start of an interpreter are not those of hosts.
 Medians of {repeats} repeats in turn (lowest-highest).
 
 {measuring.table(["hosts", "", *COLUMNS], rows)}
