@@ -453,7 +453,7 @@ SPARED: Mapping[tuple[str, str], str] = {
     (f"{_H}/peers/goals.py", "except GoalRefused"): "tells which peer was not stopped",
     (f"{_H}/peers/streams/inbound.py", "kind not in MESSAGES"): "what was asked for is one of them",
     (f"{_H}/peers/streams/inbound.py", 'self.producer.kind != "image"'): _RESTORED,
-    (f"{_H}/peers/streams/inbound.py", "frame.bulk is None"): _RESTORED,
+    (f"{_H}/peers/streams/inbound.py", "not frame.pieces"): _RESTORED,
     (f"{_H}/peers/streams/jpeg.py", "picture.mode != mode"): (
         "Pillow gives no bytes of one mode as those of another"
     ),

@@ -294,7 +294,7 @@ async def test_lying_producer_is_cut_off(
 @pytest.mark.parametrize("length", [1, mmap.PAGESIZE, mmap.PAGESIZE + 1, 1_000_003])
 def test_slot_is_there_whole_once_it_was_written_to(length: int) -> None:
     ring = SlotRing()
-    slot = ring.write(bytes(length), length)
+    slot = ring.write((bytes(length),), length)
     assert slot is not None
     found = os.fstat(slot.descriptor)
     assert found.st_blocks * 512 >= found.st_size == slot.size
@@ -415,10 +415,10 @@ def test_slots_are_sealed_before_they_are_handed_over() -> None:
 
 def test_ring_uses_no_slot_that_is_read() -> None:
     ring = SlotRing()
-    first = ring.write(b"a" * 100, 100)
+    first = ring.write((b"a" * 100,), 100)
     assert first is not None
     first.readers = 1
-    second = ring.write(b"b" * 100, 100)
+    second = ring.write((b"b" * 100,), 100)
     assert second is not None and second is not first
     assert first.memory[:1] == b"a"
     first.readers = 0
@@ -480,7 +480,7 @@ def test_message_that_is_larger_than_a_worker_may_have_in_one_piece_is_told_with
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
     try:
         with pytest.raises(OSError) as caught:
-            SlotRing().write(bytes(8192), 8192)
+            SlotRing().write((bytes(8192),), 8192)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert caught.value.errno == errno.EFBIG

@@ -104,7 +104,7 @@ def _asked() -> list[bytes]:
 
 def _told() -> list[bytes]:
     over = bridge.Over(Problem("CODE", "message"))
-    frame = bridge.Frame(3, bridge.Coding.RAW, {"t": 1.0}, b"bulk")
+    frame = bridge.Frame(3, bridge.Coding.RAW, {"t": 1.0}, (b"bulk",))
     return [
         bridge.head(frame),
         bridge.told(bridge.Opened("image")),

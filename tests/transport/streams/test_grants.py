@@ -15,7 +15,7 @@ from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys
 from nondum.transport.peers.refusals import Reason
 from nondum.transport.streams import Exporter, outgoing, packets
-from nondum.transport.streams.packets import Claim, Handled, Opened, Over, Pong
+from nondum.transport.streams.packets import VERSION, Claim, Handled, Opened, Over, Pong
 
 pytestmark = pytest.mark.anyio
 
@@ -28,7 +28,7 @@ async def works(host: Owner) -> None:
     reading = host.read(READER, granted)
     await within(granted.claimed)
     granted.send()
-    assert bytes((await reading.until(1)).bulk or b"") == b"pixels"
+    assert b"".join((await reading.until(1)).pieces) == b"pixels"
     granted.outgoing.end(Problem("STREAM_ENDED", "enough"))
     assert (await within(reading.over)).message == "enough"
 
@@ -47,7 +47,7 @@ async def test_longest_frame_arrives() -> None:
         reading = host.read(READER, granted)
         await within(granted.claimed)
         granted.send(bytes(packets.MAX_BULK))
-        assert len(bytes((await reading.until(1)).bulk or b"")) == packets.MAX_BULK
+        assert sum(map(len, (await reading.until(1)).pieces)) == packets.MAX_BULK
 
 
 async def test_longest_message_of_a_reader_arrives() -> None:
@@ -107,7 +107,7 @@ def claimed(host: Owner) -> tuple[Granted, Raw]:
     """A stream that was granted to the reader, who claims it."""
     granted = host.grant(READER)
     raw = host.raw(READER, granted)
-    raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+    raw.say(packets.asked(Claim(VERSION, granted.outgoing.token)))
     return granted, raw
 
 
@@ -140,7 +140,7 @@ async def test_silent_reader_is_given_up(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(outgoing, "SILENT_S", 0.5)
     async with owner() as host:
         granted = host.grant(READER)
-        host.raw(READER, granted).say(packets.asked(Claim(1, granted.outgoing.token)))
+        host.raw(READER, granted).say(packets.asked(Claim(VERSION, granted.outgoing.token)))
         assert (await within(granted.over)).code == "STREAM_SILENT"
 
 
@@ -161,7 +161,7 @@ async def test_reader_that_closes_is_noticed_at_once() -> None:
         (packets.asked(Handled(7)),),
         (packets.asked(Handled(1)), b"more"),
         (b"more", packets.asked(packets.Ping(1.0))),
-        (packets.asked(Claim(1, "again")),),
+        (packets.asked(Claim(VERSION, "again")),),
     ],
     ids=["garbage", "empty", "never-sent", "two-parts", "two-parts-the-last-sound", "claim"],
 )
@@ -187,7 +187,12 @@ async def test_flood_of_signs_of_life_is_cut() -> None:
 
 @pytest.mark.parametrize(
     "parts",
-    [(b"garbage",), (packets.asked(Handled(1)),), (packets.asked(Claim(2, "x")),), (b"a", b"b")],
+    [
+        (b"garbage",),
+        (packets.asked(Handled(1)),),
+        (packets.asked(Claim(VERSION + 1, "x")),),
+        (b"a", b"b"),
+    ],
     ids=["garbage", "no-claim", "version", "two-parts"],
 )
 async def test_first_message_must_be_the_claim(parts: tuple[bytes, ...]) -> None:
@@ -200,11 +205,12 @@ async def test_first_message_must_be_the_claim(parts: tuple[bytes, ...]) -> None
         await within(host.read(READER, granted).opened)
 
 
-async def test_claim_in_another_version_is_told_so() -> None:
+@pytest.mark.parametrize("version", [VERSION - 1, VERSION + 1], ids=["before", "next"])
+async def test_claim_in_another_version_is_told_so(version: int) -> None:
     async with owner() as host:
         granted = host.grant(READER)
         raw = host.raw(READER, granted)
-        raw.say(packets.asked(Claim(packets.VERSION + 1, granted.outgoing.token)))
+        raw.say(packets.asked(Claim(version, granted.outgoing.token)))
         told = await raw.hears()
         assert isinstance(told, Over)
         assert told.problem.code == "BRIDGE_VERSION"
@@ -242,7 +248,7 @@ async def test_sender_of_a_message_without_its_last_part_is_cut() -> None:
     async with owner() as host, stalling(host.port, to_port=600_000, to_client=10_000_000) as port:
         granted = host.grant(READER)
         raw = host.raw(READER, granted, port=port)
-        raw.say(packets.asked(Claim(1, granted.outgoing.token)))
+        raw.say(packets.asked(Claim(VERSION, granted.outgoing.token)))
         assert await raw.hears() == Opened("image")
         raw.say(*([b"x" * 10] * 30_000))
         assert (await within(granted.over)).code == "BRIDGE_PACKET"

@@ -23,7 +23,7 @@ OPENED = [packets.told(Opened("image"))]
 
 
 def frame(seq: int) -> list[bytes]:
-    return [packets.head(Frame(seq, Coding.RAW, {}, None)), b"pixels" * 100_000]
+    return [packets.head(Frame(seq, Coding.RAW, {})), *map(bytes, packets.cut(bytes(600_000)))]
 
 
 @contextlib.asynccontextmanager

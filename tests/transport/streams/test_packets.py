@@ -14,6 +14,8 @@ from nondum.sdk.wire import pack
 from nondum.transport.streams import packets
 from nondum.transport.streams.packets import (
     MAX_ASKED,
+    MAX_BULK,
+    PIECE,
     Asked,
     Claim,
     Coding,
@@ -32,9 +34,10 @@ ASKED = st.one_of(
     st.builds(Claim, NUMBERS, NAMES), st.builds(Handled, NUMBERS), st.builds(Ping, CLOCKS)
 )
 HEADERS = st.dictionaries(NAMES, st.one_of(st.integers(-100, 100), NAMES), max_size=4)
-FRAMES = st.builds(
-    Frame, NUMBERS, st.sampled_from(Coding), HEADERS, st.one_of(st.none(), st.binary(max_size=64))
+PIECES = st.one_of(
+    st.just(()), st.integers(0, 3 * PIECE).map(lambda length: packets.cut(bytes(length)))
 )
+FRAMES = st.builds(Frame, NUMBERS, st.sampled_from(Coding), HEADERS, PIECES)
 PROBLEMS = st.builds(Problem, NAMES, NAMES)
 TOLD = st.one_of(
     st.builds(Opened, NAMES), st.builds(Pong, CLOCKS, CLOCKS), st.builds(Over, PROBLEMS)
@@ -61,17 +64,20 @@ def test_bridge_of_the_version_before_is_understood() -> None:
     for name, message in asked.items():
         assert packets.read_asked(*version_before.packets(name)) == message
     over = Over(Problem("STREAM_GONE", "it has ended"))
-    frame = Frame(2, Coding.RAW, {"width": 2, "height": 1}, b"ab")
+    frame = Frame(2, Coding.RAW, {"width": 2, "height": 1}, (b"ab",))
     told = {"opened": Opened("text"), "pong": Pong(1.5, 2.5), "over": over, "frame": frame}
     for name, message in told.items():
         assert packets.read_told(version_before.packets(name)) == message
-    assert packets.VERSION == 1, "another one needs an answer to those that claim with 1"
 
 
 @given(FRAMES)
 def test_frame_survives(frame: Frame) -> None:
-    parts = [packets.head(frame)] + ([] if frame.bulk is None else [bytes(frame.bulk)])
-    assert packets.read_told(parts) == frame
+    assert packets.read_told([packets.head(frame), *frame.pieces]) == frame
+
+
+@given(st.integers(0, 3 * PIECE))
+def test_pieces_are_the_whole(length: int) -> None:
+    assert b"".join(packets.cut(bytes(length))) == bytes(length)
 
 
 @given(st.one_of(st.binary(), ANYTHING.map(lambda value: pack(value))))
@@ -85,7 +91,9 @@ def test_anything_else_is_a_violation(data: bytes) -> None:
     "parts",
     [
         [],
-        [pack([2, 1, 0, {}]), b"", b""],
+        [pack([2, 1, 0, {}]), b"short", b"more"],
+        [pack([2, 1, 0, {}]), bytes(PIECE + 1)],
+        [pack([2, 1, 0, {}]), *[bytes(PIECE)] * (MAX_BULK // PIECE), b"more"],
         [pack([1, "image"]), b"bulk"],
         [pack([2, 1, 7, {}])],
         [pack([2, 1, True, {}])],
@@ -94,7 +102,19 @@ def test_anything_else_is_a_violation(data: bytes) -> None:
         [b"\x93\x03\xcb?\xf0\0\0\0\0\0\0\xcb\x7f\xf0\0\0\0\0\0\0"],
         [pack([4, {"code": "X"}])],
     ],
-    ids=["nothing", "three", "bulk", "coding", "bool", "seq", "clock", "endless", "problem"],
+    ids=[
+        "nothing",
+        "piece-short",
+        "piece-long",
+        "pieces-many",
+        "bulk",
+        "coding",
+        "bool",
+        "seq",
+        "clock",
+        "endless",
+        "problem",
+    ],
 )
 def test_almost_right_is_wrong(parts: list[bytes]) -> None:
     with pytest.raises(ProtocolViolation):

@@ -29,7 +29,7 @@ CROWDED_TRIES = 250
 _CUT_SHORT = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)
 _CLOSE_ON_EXEC = int(socket.MSG_CMSG_CLOEXEC)
 
-Handle: TypeAlias = Union[int, "Packets"]
+Handle: TypeAlias = Union[int, "PausablePackets"]
 """What a packet can carry to a new connection: a descriptor, or an end in memory."""
 OnPacket: TypeAlias = Callable[[bytes, tuple[Handle, ...]], None]
 OnClosed: TypeAlias = Callable[[ProtocolViolation | None], None]
@@ -65,6 +65,22 @@ class Packets(Protocol):
         ...
 
 
+class PausablePackets(Packets, Protocol):
+    """One end that need not be woken by each packet that comes."""
+
+    def pause(self) -> None:
+        """Read no more until `resume`, but by `take_in`."""
+        ...
+
+    def resume(self) -> None:
+        """Read again as it comes."""
+        ...
+
+    def take_in(self) -> None:
+        """Read now what has come, some of it at least."""
+        ...
+
+
 class SocketPackets:
     """Packets over a non-blocking AF_UNIX SOCK_SEQPACKET socket, which it owns."""
 
@@ -93,7 +109,7 @@ class SocketPackets:
         """Begin to read (see `Packets`)."""
         self._on_packet, self._on_closed = on_packet, on_closed
         self._loop = asyncio.get_running_loop()
-        self._loop.add_reader(self._sock.fileno(), self._on_readable)
+        self.resume()
 
     def send(self, data: bytes, handles: Sequence[Handle] = ()) -> bool:
         """Send a packet (see `Packets`)."""
@@ -133,6 +149,16 @@ class SocketPackets:
 
         loop.add_writer(descriptor, writable)
 
+    def pause(self) -> None:
+        """Read only when told to (see `PausablePackets`)."""
+        if self._loop is not None and self._sock.fileno() >= 0:
+            self._loop.remove_reader(self._sock.fileno())
+
+    def resume(self) -> None:
+        """Read again as it comes (see `PausablePackets`)."""
+        if self._loop is not None and self._sock.fileno() >= 0:
+            self._loop.add_reader(self._sock.fileno(), self.take_in)
+
     def close(self) -> None:
         """Stop reading and close the socket."""
         if self._sock.fileno() < 0:
@@ -148,7 +174,8 @@ class SocketPackets:
             self._retry.cancel()
             self._retry = None
 
-    def _on_readable(self) -> None:
+    def take_in(self) -> None:
+        """Read what has come, `BATCH` packets at most."""
         for _ in range(BATCH):
             if self._sock.fileno() < 0:
                 return  # closed by what a packet led to
@@ -228,6 +255,15 @@ class MemoryPackets:
         """Call back on the next turn of the loop: memory is always writable."""
         asyncio.get_running_loop().call_soon(callback)
 
+    def pause(self) -> None:
+        """Do nothing: the other end delivers."""
+
+    def resume(self) -> None:
+        """Do nothing (see `pause`)."""
+
+    def take_in(self) -> None:
+        """Do nothing (see `pause`)."""
+
     def close(self) -> None:
         """Let go of the other end, which is told."""
         peer, self._peer, self._on_packet, self._on_closed = self._peer, None, None, None
@@ -246,7 +282,9 @@ class MemoryPackets:
             on_closed(None)
 
 
-def adopt(handle: Handle, limit: int, on_crowded: Callable[[], None] = lambda: None) -> Packets:
+def adopt(
+    handle: Handle, limit: int, on_crowded: Callable[[], None] = lambda: None
+) -> PausablePackets:
     """Make an end of a handle that arrived, and own it."""
     if isinstance(handle, int):
         return SocketPackets(socket.socket(fileno=handle), limit, on_crowded=on_crowded)

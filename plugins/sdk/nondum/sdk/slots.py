@@ -6,6 +6,7 @@ it under a reader, grow it, or write to it. The producer alone counts who still 
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import itertools
@@ -13,7 +14,7 @@ import mmap
 import os
 import resource
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from nondum.sdk.errors import Problem, ProtocolViolation
 from nondum.sdk.messages import Buffer
@@ -55,8 +56,9 @@ class Slot:
             raise
 
     def close(self) -> None:
-        """Let go of the memory; readers' own mappings live on."""
-        self.memory.close()
+        """Let go of the memory; readers' own mappings live on, and views of it here."""
+        with contextlib.suppress(BufferError):  # somebody has a view: its end is the memory's
+            self.memory.close()
         os.close(self.descriptor)
 
 
@@ -75,14 +77,19 @@ class SlotRing:
         """Slots with readers."""
         return sum(1 for slot in self._slots.values() if slot.readers)
 
-    def write(self, data: Buffer, length: int) -> Slot | None:
-        """Copy `length` bytes into a slot that has no reader; None when all have readers.
+    def write(self, pieces: Iterable[Buffer], length: int) -> Slot | None:
+        """Copy `length` bytes, piece by piece, into a slot that has no reader; None when all have
+        readers.
 
         Raises `OSError` when the system has no memory or descriptors left.
         """
         slot = self._free_slot(length)
         if slot is not None:
-            slot.memory[:length] = data
+            at = 0
+            for piece in pieces:
+                end = at + memoryview(piece).nbytes
+                slot.memory[at:end] = piece
+                at = end
         return slot
 
     def retire(self, keep: int, length: int = 0) -> Iterator[int]:

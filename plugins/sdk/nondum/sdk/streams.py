@@ -20,13 +20,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nondum.sdk.errors import MessageInvalid, Problem, ProtocolViolation
 from nondum.sdk.frozen import frozen
 from nondum.sdk.messages import Buffer, Message, message_from_wire
-from nondum.sdk.packets import Handle, Packets, discard
+from nondum.sdk.packets import Handle, Packets, PausablePackets, discard
 from nondum.sdk.slots import MAX_SLOT_BYTES, MappedSlots, Slot, SlotRing
 from nondum.sdk.wire import MAX_PACKET, pack, unpack
 
@@ -38,6 +38,9 @@ INLINE_BYTES = 16 * 1024
 """Bulk bytes up to here travel in the packet."""
 SPARE_SLOTS = 2
 """One that waits for slow consumers and one that is being written."""
+QUIET_S = 0.2
+"""After a message, releases are read with the next one, or when this time is over: a producer is
+woken by none of them as long as it sends."""
 UNLIMITED = 2**31
 """Packets that never leave the process may be this long."""
 
@@ -51,6 +54,14 @@ class _Frame:
     seq: int
     packet: bytes
     slot: Slot | None = None
+
+
+@frozen
+class _Joined:
+    """Bulk bytes that lie in a slot already."""
+
+    data: memoryview
+    slot: Slot
 
 
 class Producer:
@@ -68,8 +79,13 @@ class Producer:
         self._outlets: dict[str, _Outlet] = {}
         self._ring = SlotRing()
         self._seq = 0
+        self._sent_s = 0.0
+        self._listens: asyncio.TimerHandle | None = None
+        """None: releases are read as they come."""
+        self._joined: _Joined | None = None
+        """For the next message; no slot is let go of until that is sent."""
 
-    def connect(self, consumer: str, packets: Packets) -> None:
+    def connect(self, consumer: str, packets: PausablePackets) -> None:
         """Feed one more consumer, from the next message on; owns `packets`."""
         self.disconnect(consumer)
         self._outlets[consumer] = _Outlet(packets, lambda: self._lose(consumer))
@@ -97,44 +113,94 @@ class Producer:
         Raises `MessageInvalid` for wrong values, a header that fits no packet, and more data than
         a reader takes.
         """
+        joined, self._joined = self._joined, None
         message.check()
         if not self._outlets:
             return
         header, buffer = message.to_wire()
         length = 0 if buffer is None else memoryview(buffer).nbytes
         _check_length(length)
+        if joined is None:
+            self._take_in()
         self._seq += 1
         shared = [outlet for outlet in self._outlets.values() if outlet.packets.shares_memory]
         apart = [outlet for outlet in self._outlets.values() if not outlet.packets.shares_memory]
         if buffer is not None and length > INLINE_BYTES and shared:
-            self._offer_slot(shared, header, buffer, length)
+            is_there = joined is not None and joined.data is buffer
+            slot = joined.slot if joined and is_there else self._written((buffer,), length)
+            if slot is not None:  # or all are being read: this frame is dropped for all
+                self._offer(shared, self._in_slot(slot, header, length))
         elif shared:
             self._offer(shared, self._inline(header, buffer, MAX_PACKET))
         if apart:
             self._offer(apart, self._inline(header, buffer, UNLIMITED))
+        self._pause()
+
+    def joined(self, pieces: Sequence[Buffer]) -> Buffer:
+        """Bulk bytes that have come in pieces as one, for the next message that is sent: that need
+        not copy them once more, if any consumer shares memory.
+
+        Raises `OSError` when the system has no memory or descriptors left.
+        """
+        if len(pieces) == 1:
+            return pieces[0]
+        length = sum(memoryview(piece).nbytes for piece in pieces)
+        slot = None
+        self._take_in()
+        if any(outlet.packets.shares_memory for outlet in self._outlets.values()):
+            slot = self._written(pieces, length)
+        if slot is None:
+            return b"".join(pieces)
+        self._joined = _Joined(memoryview(slot.memory)[:length].toreadonly(), slot)
+        return self._joined.data
 
     def close(self) -> None:
         """End the stream for all consumers."""
         for consumer in list(self._outlets):
             self.disconnect(consumer)
         self._ring.close()
+        if self._listens is not None:
+            self._listens.cancel()
 
     def _lose(self, consumer: str) -> None:
         self.disconnect(consumer)
         self._on_lost(consumer)
 
+    def _pause(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._sent_s = loop.time()
+        if self._listens is None:
+            self._listens = loop.call_later(QUIET_S, self._listen)
+        for outlet in self._outlets.values():
+            outlet.pause()
+
+    def _listen(self) -> None:
+        """Read releases as they come, once nothing was sent for a while."""
+        loop = asyncio.get_running_loop()
+        left_s = self._sent_s + QUIET_S - loop.time()
+        if left_s > 0:
+            self._listens = loop.call_later(left_s, self._listen)
+            return
+        self._listens = None
+        for outlet in tuple(self._outlets.values()):
+            outlet.listen()
+
     def _inline(self, header: dict[str, Any], buffer: Buffer | None, limit: int) -> _Frame:
         return _Frame(self._seq, _packed([_INLINE, self._seq, header, buffer], limit))
 
-    def _offer_slot(
-        self, outlets: list[_Outlet], header: dict[str, Any], buffer: Buffer, length: int
-    ) -> None:
-        self._retire(length)
-        slot = self._ring.write(buffer, length)
-        if slot is None:
-            return  # every slot is being read: this frame is dropped for all
+    def _in_slot(self, slot: Slot, header: dict[str, Any], length: int) -> _Frame:
         fields = [_IN_SLOT, self._seq, slot.id, length, header]
-        self._offer(outlets, _Frame(self._seq, _packed(fields, MAX_PACKET), slot))
+        return _Frame(self._seq, _packed(fields, MAX_PACKET), slot)
+
+    def _written(self, pieces: Sequence[Buffer], length: int) -> Slot | None:
+        """A slot with these bytes; None: all are being read."""
+        self._retire(length)
+        return self._ring.write(pieces, length)
+
+    def _take_in(self) -> None:
+        """Read the releases that have come, and the ends of consumers."""
+        for outlet in tuple(self._outlets.values()):
+            outlet.take_in()
 
     def _offer(self, outlets: list[_Outlet], frame: _Frame) -> None:
         for outlet in outlets:
@@ -150,13 +216,31 @@ class Producer:
 class _Outlet:
     """What a producer knows of one consumer."""
 
-    def __init__(self, packets: Packets, on_closed: Callable[[], None]) -> None:
+    def __init__(self, packets: PausablePackets, on_closed: Callable[[], None]) -> None:
         self.packets = packets
         self._on_closed = on_closed
         self._outstanding: dict[int, _Frame] = {}
         self._newest: _Frame | None = None
         self._mapped: set[int] = set()
+        self._is_listening = True
         packets.open(self._released, lambda _violation: on_closed())
+
+    def take_in(self) -> None:
+        """Read the releases that have come."""
+        if not self._is_listening:
+            self.packets.take_in()
+
+    def pause(self) -> None:
+        """Be woken by no release, unless a message waits for one."""
+        if self._is_listening and self._newest is None:
+            self._is_listening = False
+            self.packets.pause()
+
+    def listen(self) -> None:
+        """Read releases as they come."""
+        if not self._is_listening:
+            self._is_listening = True
+            self.packets.resume()
 
     def offer(self, frame: _Frame) -> None:
         """Send a message now, or let it wait in place of an older one."""
@@ -185,11 +269,15 @@ class _Outlet:
 
     def _send_newest(self) -> None:
         frame = self._newest
-        if frame is None or len(self._outstanding) >= OUTSTANDING:
+        if frame is None:
+            return
+        if len(self._outstanding) >= OUTSTANDING:
+            self.listen()
             return
         is_new = frame.slot is not None and frame.slot.id not in self._mapped
         handles = (frame.slot.descriptor,) if frame.slot is not None and is_new else ()
         if not self.packets.send(frame.packet, handles):
+            self.listen()
             self.packets.when_writable(self._send_newest)
             return
         if frame.slot is not None:

@@ -158,7 +158,7 @@ async def test_frame_longer_than_allowed_ends_the_connection(
     async with both() as (owner, bridge):
         outgoing, _, over = await owner.opened(bridge)
         outgoing.send(Coding.RAW, HEADER, bytes(65 * 1024 * 1024))
-        assert await over.code() == "STREAM_LOST"
+        assert await over.code() == "BRIDGE_PACKET"
         await arrives(owner, bridge)
 
 

@@ -43,8 +43,8 @@ class Drained:
         self._loop.add_reader(self._descriptor, self.drain)
         self._look_again()
 
-    def send(self, frames: Sequence[bytes | zmq.Frame]) -> Sent:
-        """Send one message, without waiting. Frames are sent from where they lie."""
+    def send(self, frames: Sequence[bytes | memoryview | zmq.Frame]) -> Sent:
+        """Send one message, without waiting. What is no `zmq.Frame` is copied."""
         if self.is_closed:
             return Sent.GONE
         try:

@@ -127,8 +127,7 @@ class Exporter:
         if not isinstance(message, Claim):
             raise ProtocolViolation(Problem("BRIDGE_PACKET", "a reader begins with its claim"))
         if message.version != VERSION:
-            told = f"this host's bridge speaks version {VERSION}"
-            raise ProtocolViolation(Problem("BRIDGE_VERSION", told, have=str(message.version)))
+            raise ProtocolViolation(_other_version(message.version))
         granted = self._grants.get(message.token)
         reader = data.get("User-Id")
         if (
@@ -170,6 +169,16 @@ class Exporter:
         self._claimed = {id_: one for id_, one in self._claimed.items() if not one.is_over}
 
 
+def _other_version(theirs: int) -> Problem:
+    return Problem(
+        "BRIDGE_VERSION",
+        "the two hosts speak different versions of the protocol for streams",
+        need=str(VERSION),
+        have=str(theirs),
+        fix=f"update nondum on the host that {'asked' if theirs < VERSION else 'has the stream'}",
+    )
+
+
 class _Way:
     """A connection to the listening socket."""
 
@@ -177,7 +186,7 @@ class _Way:
         self._listener, self._routing_id, self.descriptor = listener, routing_id, descriptor
         self._end = tcp.other_end(descriptor)
 
-    def send(self, parts: list[bytes | zmq.Frame]) -> Sent:
+    def send(self, parts: Sequence[bytes | memoryview]) -> Sent:
         """Send without waiting."""
         return self._listener.send([self._routing_id, *parts])
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
-
-import zmq
 
 from nondum.sdk.errors import Problem
 from nondum.sdk.messages import Buffer
@@ -31,7 +29,7 @@ class Way(Protocol):
 
     descriptor: int
 
-    def send(self, parts: list[bytes | zmq.Frame]) -> Sent:
+    def send(self, parts: Sequence[bytes | memoryview]) -> Sent:
         """Send without waiting."""
 
     def cut(self) -> None:
@@ -77,18 +75,16 @@ class Outgoing:
         return self._way is not None and not self.is_over and self._window.can_send
 
     def send(self, coding: Coding, header: Mapping[str, Any], bulk: Buffer | None) -> None:
-        """Send a message; `can_send` must hold. `bulk` is read until it has left.
+        """Send a message; `can_send` must hold.
 
         Raises `ProtocolViolation` for a header that fits no packet.
         """
         assert self._way is not None, "nothing can be sent before the grant is claimed"
         self.frames_sent += 1
-        frame = packets.Frame(self.frames_sent, coding, header, bulk)
-        parts: list[bytes | zmq.Frame] = [packets.head(frame)]
-        length = len(parts[0])
-        if bulk is not None:
-            length += memoryview(bulk).nbytes
-            parts.append(zmq.Frame(bulk, copy=False))
+        pieces = () if bulk is None else packets.cut(bulk)
+        frame = packets.Frame(self.frames_sent, coding, header, pieces)
+        parts: list[bytes | memoryview] = [packets.head(frame), *pieces]
+        length = sum(map(len, parts))
         match self._way.send(parts):
             case Sent.SENT:
                 self.bytes_sent += length

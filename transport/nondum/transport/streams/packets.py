@@ -1,13 +1,14 @@
 """What two bridges say to each other over the connection of one stream: values and their parts.
 
 Pure: whatever a hostile bridge sends, `read_asked` and `read_told` give a value or raise
-`ProtocolViolation`. A message has one part, a frame with bulk bytes two.
+`ProtocolViolation`. A message has one part, and a frame one more for each piece of its bulk bytes:
+while one piece is sealed, the one before is on its way, and the one before that is opened.
 
     reader → owner   [1, version, token]              a grant is claimed: the first message
                      [2, seq]                         a frame has been handled
                      [3, at_s]                        a sign of life
     owner → reader   [1, type]                        the claim holds: frames follow
-                     [2, seq, coding, header], bulk   a frame
+                     [2, seq, coding, header], piece … a frame
                      [3, at_s, clock_s]               a sign of life, and the owner's clock
                      [4, problem]                     the stream is over
 """
@@ -24,13 +25,15 @@ from nondum.sdk.messages import Buffer
 from nondum.sdk.wire import Body, pack, unpack
 from nondum.sdk.wire_fields import Name, Number, read_field, read_problem
 
-VERSION = 1
+VERSION = 2
 MAX_ASKED = 1024
 """Bytes of a reader's message."""
 PINGS_HZ = 20.0
 """Signs of life that each end bears for long; more end the connection."""
 MAX_BULK = 64 * 1024 * 1024
 """Bulk bytes of one frame; longer ones stay on their host."""
+PIECE = 128 * 1024
+"""Bulk bytes of all pieces but the last one."""
 
 
 class Coding(Enum):
@@ -80,7 +83,8 @@ class Frame:
     seq: int
     coding: Coding
     header: Mapping[str, Any]
-    bulk: Buffer | None
+    pieces: tuple[Buffer, ...] = ()
+    """Its bulk bytes; none if the type has no such."""
 
 
 @frozen
@@ -139,29 +143,43 @@ def told(message: Opened | Pong | Over) -> bytes:
 
 
 def head(frame: Frame) -> bytes:
-    """A frame's first part; its bulk is the second, if it has any.
+    """A frame's first part; its pieces follow.
 
     Raises `ProtocolViolation` for a header that fits no packet.
     """
     return pack([2, frame.seq, frame.coding.value, frame.header])
 
 
+def cut(bulk: Buffer) -> tuple[memoryview, ...]:
+    """The pieces of bulk bytes: at least one."""
+    data = memoryview(bulk).cast("B")
+    return tuple(data[at : at + PIECE] for at in range(0, data.nbytes or 1, PIECE))
+
+
 def read_told(parts: Sequence[Buffer]) -> Told:
-    """Read an owner's message; a frame's bulk stays where it is. Raises `ProtocolViolation`."""
-    if not 1 <= len(parts) <= 2:
-        raise _violation(f"a message has one part or two, not {len(parts)}")
-    bulk = parts[1] if len(parts) == 2 else None
+    """Read an owner's message; a frame's pieces stay where they are. Raises `ProtocolViolation`."""
+    if not parts:
+        raise _violation("a message has one part at least")
+    pieces = tuple(parts[1:])
     fields = unpack(bytes(parts[0]))
     match fields:
-        case [2, seq, 0 | 1 as coding, header] if type(coding) is int:
-            return Frame(read_field(Number, seq), Coding(coding), read_field(Body, header), bulk)
-        case [1, kind] if bulk is None:
+        case [2, seq, 0 | 1 as coding, header] if type(coding) is int and _are_cut(pieces):
+            return Frame(read_field(Number, seq), Coding(coding), read_field(Body, header), pieces)
+        case [1, kind] if not pieces:
             return Opened(read_field(Name, kind))
-        case [3, at_s, clock_s] if bulk is None:
+        case [3, at_s, clock_s] if not pieces:
             return Pong(_clock(at_s), _clock(clock_s))
-        case [4, problem] if bulk is None:
+        case [4, problem] if not pieces:
             return Over(read_problem(problem))
     raise _violation("no message of a stream's owner")
+
+
+def _are_cut(pieces: Sequence[Buffer]) -> bool:
+    """Whether they are as `cut` makes them, and no more than may be."""
+    *others, last = pieces or (b"",)
+    return len(last) <= min(PIECE, MAX_BULK - len(others) * PIECE) and all(
+        len(piece) == PIECE for piece in others
+    )
 
 
 def _clock(value: object) -> float:

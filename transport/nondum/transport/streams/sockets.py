@@ -10,7 +10,7 @@ from nondum.sdk.errors import Problem
 from nondum.transport.peers.failures import PeerRefused
 from nondum.transport.peers.keys import HostKeys, PeerKey
 from nondum.transport.peers.received import SEALED
-from nondum.transport.streams.packets import MAX_ASKED, MAX_BULK
+from nondum.transport.streams.packets import MAX_ASKED, PIECE
 from nondum.transport.streams.window import SMALL_MESSAGES
 
 Context = zmq.Context[zmq.Socket[bytes]]
@@ -40,7 +40,7 @@ def listening(context: Context, keys: HostKeys) -> zmq.Socket[bytes]:
 def dialling(context: Context, keys: HostKeys, owner: PeerKey) -> zmq.Socket[bytes]:
     """A socket for one connection to the bridge that has a stream, not connected yet."""
     socket = context.socket(zmq.DEALER)
-    _bound(socket, MAX_BULK)
+    _bound(socket, PIECE)
     socket.setsockopt(zmq.RECONNECT_IVL, NEVER_MS)
     socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS)
     socket.setsockopt(zmq.CURVE_PUBLICKEY, keys.public.encode("ascii"))

@@ -6,11 +6,12 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from nondum.host.peers.streams import jpeg
 from nondum.sdk.errors import NondumError, Problem, WorkerFailed
-from nondum.sdk.messages import MESSAGES, Buffer, message_from_wire
+from nondum.sdk.messages import MESSAGES, message_from_wire
 from nondum.sdk.streams import Producer
 from nondum.transport.peers.keys import HostKeys
 from nondum.transport.streams import Coding, Frame, Incoming, Place
@@ -82,23 +83,25 @@ class Inbound:
             if frame.coding is Coding.JPEG:
                 self._restoring = self._loop.create_task(self._restore(frame))
             else:
-                self._hand_on(frame, frame.bulk)
+                self._hand_on(frame)
 
     async def _restore(self, frame: Frame) -> None:
         try:
-            if self.producer.kind != "image" or frame.bulk is None:
+            if self.producer.kind != "image" or not frame.pieces:
                 raise WorkerFailed(Problem("JPEG_INVALID", "only images come as JPEG"))
-            pixels = await asyncio.to_thread(jpeg.restored, frame.header, frame.bulk)
-            self._hand_on(frame, pixels)
+            data = b"".join(frame.pieces)
+            pixels = await asyncio.to_thread(jpeg.restored, frame.header, data)
+            self._hand_on(replace(frame, pieces=(pixels,)))
         except NondumError as error:
             self._stop(error.problems[0])
         finally:
             self._restoring = None
         self._take_in()
 
-    def _hand_on(self, frame: Frame, bulk: Buffer | None) -> None:
+    def _hand_on(self, frame: Frame) -> None:
         try:
             header = _by_our_clock(frame.header, self._incoming.clocks.ahead_s)
+            bulk = self.producer.joined(frame.pieces) if frame.pieces else None
             self.producer.send(message_from_wire(self.producer.kind, header, bulk))
         except NondumError as error:
             self._stop(error.problems[0])
