@@ -223,7 +223,7 @@ class RunningHost:
         own = self.base.config.host
         log.info("host %s listens at %s", own.name, own.control)
         try:
-            if self.base.keeps_ready:
+            if self.base.forks_stay is None:
                 await self.workers.keep_spare()
             if self.peers is not None:
                 await self.peers.start()

@@ -21,7 +21,7 @@ from tests.kit.until import arrived, until_async
 from tests.kit.watches import watches_left
 
 from nondum.host.forking import fork_server
-from nondum.host.forking.fork_client import ForkClient
+from nondum.host.forking.fork_client import REST_S, ForkClient
 from nondum.host.jobs.children import START_S, Children
 from nondum.sdk.errors import InstallFailed
 
@@ -37,7 +37,7 @@ async def fork_client(
     module: str = "nondum.host.jobs.child",
     on_crowded: Callable[[], None] = lambda: None,
     *,
-    stays: bool = True,
+    stays: Callable[[], bool] | None = None,
 ) -> AsyncIterator[ForkClient]:
     client = ForkClient(module, on_crowded, stays=stays)
     try:
@@ -140,31 +140,46 @@ async def test_server_that_has_ended_prepares_for_nothing_and_is_started_again()
         forked.close()
 
 
-async def test_server_that_does_not_stay_is_there_while_something_of_it_runs() -> None:
-    async with fork_client(stays=False) as client:
-        await client.expect(JOB)
-        assert client.pid is None
+async def test_server_that_does_not_stay_is_there_while_something_of_it_runs(
+    clock: VirtualClock,
+) -> None:
+    async with fork_client(stays=lambda: False) as client:
         forked = await client.fork(JOB, START_S)
         first = server_of(client)
-        await client.rest()
+        await clock.advance(10 * REST_S)
         assert client.pid == first
         forked.kill()
         await forked.over()
         with process_ended(first) as ended:
-            await client.rest()
-            await ended.wait()
-        assert client.pid is None
+            await clock.advance_until(ended.wait(), REST_S)
         forked.close()
         (await client.fork(JOB, START_S)).close()
         assert server_of(client) != first
 
 
-async def test_server_that_stays_does_not_end_when_it_rests() -> None:
-    async with fork_client() as client:
+async def test_server_stays_as_long_as_it_is_said_to(clock: VirtualClock) -> None:
+    stays = [True]
+    async with fork_client(stays=lambda: stays[0]) as client:
         await client.expect(JOB)
         first = server_of(client)
-        await client.rest()
+        await clock.advance(10 * REST_S)
         assert client.pid == first
+        stays[0] = False
+        with process_ended(first) as ended:
+            await clock.advance_until(ended.wait(), REST_S)
+
+
+async def test_server_that_was_just_used_does_not_end(clock: VirtualClock) -> None:
+    async with fork_client(stays=lambda: False) as client:
+        first = 0
+        for _ in range(5):
+            forked = await client.fork(JOB, START_S)
+            forked.kill()
+            await forked.over()
+            forked.close()
+            assert first in (0, server_of(client))
+            first = server_of(client)
+            await clock.advance(0.8 * REST_S)
 
 
 async def test_process_is_killed_once_nothing_waits_for_it() -> None:

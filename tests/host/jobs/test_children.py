@@ -20,8 +20,17 @@ from tests.kit.clock import VirtualClock
 from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
+from nondum.host.forking.fork_client import REST_S
 from nondum.host.jobs import allowance
-from nondum.host.jobs.children import ASIDE_STALL_S, KEPT, QUIET_S, STALL_S, START_S, Children
+from nondum.host.jobs.children import (
+    AHEAD_S,
+    ASIDE_STALL_S,
+    KEPT,
+    QUIET_S,
+    STALL_S,
+    START_S,
+    Children,
+)
 from nondum.host.rpc.outcomes import packed
 from nondum.sdk.errors import DriveGone, InstallFailed
 from nondum.sdk.pieces import cut
@@ -234,14 +243,42 @@ async def test_no_child_is_kept_when_work_has_ended(tmp_path: Path, clock: Virtu
             await clock.advance(QUIET_S * 0.1)
             await ended.wait()
         assert not pool.kept()
-        assert not pool.pids()
+
+
+async def ahead(pool: Children, clock: VirtualClock) -> int:
+    """The child that is forked once a first one has ended with its job."""
+    await pool.run("look", drive(Path("/")))
+    await clock.advance(AHEAD_S)
+    await until_async("a child ahead", lambda: bool(pool.pids()))
+    (pid,) = pool.pids()
+    return pid
+
+
+async def test_next_child_is_forked_before_it_is_needed(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    async with children() as pool:
+        waiting = await ahead(pool, clock)
+        assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
+        assert pool.kept() == {"a": waiting}
+        assert await pool.run("look", drive(tmp_path), owner="b") == NOTHING
+        assert pool.kept()["b"] != waiting, "it has read what another one brought"
+
+
+async def test_child_that_died_waiting_is_replaced(tmp_path: Path, clock: VirtualClock) -> None:
+    async with children() as pool:
+        waiting = await ahead(pool, clock)
+        with process_ended(waiting) as ended:
+            os.kill(waiting, signal.SIGKILL)
+            await ended.wait()
+        assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
 
 
 @pytest.mark.parametrize("aside", [False, True])
 async def test_fork_server_that_does_not_stay_ends_after_the_last_child(
     tmp_path: Path, clock: VirtualClock, aside: bool
 ) -> None:
-    pool = Children(stays=False)
+    pool = Children(stays=lambda: False)
     try:
         if aside:
             await pool.run_aside("look", drive(tmp_path))
@@ -250,7 +287,7 @@ async def test_fork_server_that_does_not_stay_ends_after_the_last_child(
         assert pool.server is not None
         with process_ended(pool.server) as ended:
             await clock.advance(QUIET_S)
-            await ended.wait()
+            await clock.advance_until(ended.wait(), REST_S)
         await pool.run("look", drive(tmp_path), owner="a")
     finally:
         await pool.close()

@@ -14,6 +14,7 @@ from tests.kit.processes import is_alive, process_ended
 from tests.kit.until import arrived, until_async
 from tests.planning.tasks import FOLLOW_PLAN, follow_task, gripper_task, plan_of
 
+from nondum.host.forking.fork_client import REST_S
 from nondum.host.mind.planner_process import QUIET_S, PlannerProcess, planner_forks
 from nondum.host.mind.planner_wire import Request
 from nondum.host.mind.planners import CHEAPER_S, Planners
@@ -158,18 +159,19 @@ async def test_child_stays_for_the_next_task_and_ends_without_one(
 async def test_fork_server_that_does_not_stay_ends_after_the_last_planner(
     clock: VirtualClock, task: GroundTask
 ) -> None:
-    forks = planner_forks(stays=False)
+    forks = planner_forks(stays=lambda: False)
     process = PlannerProcess(
         "native", "nondum.host.mind.native_planner:NativePlanner", forks, memory_mb=512
     )
     try:
-        await process.warm()
+        planners = Planners([process], forks)
+        await planners.warm()
         assert forks.pid is None
         await process.plan(Request(task), 5.0)
         assert forks.pid is not None
         with process_ended(forks.pid) as ended:
             await clock.advance(1.1 * QUIET_S)
-            await ended.wait()
+            await clock.advance_until(ended.wait(), REST_S)
         assert isinstance(await process.plan(Request(task), 5.0), Plan)
     finally:
         await process.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 
 from nondum.host.catalogue.catalogue import Catalogue
 from nondum.host.config.host_config import HostConfig
@@ -27,7 +28,13 @@ class Base:
     counter: CrashCounter
 
     @property
-    def keeps_ready(self) -> bool:
-        """Whether processes are kept ready for what may be plugged in or wanted next."""
+    def forks_stay(self) -> Callable[[], bool] | None:
+        """Whether what processes are forked from stays when none of them runs; None: always.
+
+        On a machine with little memory it does while a goal is given or another host is there: what
+        is wanted next cannot wait for an interpreter then.
+        """
         memory_mb = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2**20
-        return memory_mb > self.config.host.keep_ready_above_mb
+        if memory_mb > self.config.host.keep_ready_above_mb:
+            return None
+        return lambda: self.catalogue.state.is_at_work

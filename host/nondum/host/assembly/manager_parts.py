@@ -47,7 +47,7 @@ def _install_options(base: Base) -> InstallOptions:
         method=config.install.method,
         reserve_mb=config.install.reserve_mb,
         quota_mb=config.install.quota_mb,
-        keeps_ready=base.keeps_ready,
+        forks_stay=base.forks_stay,
         limits=Limits(
             memory_mb=config.workers.memory_mb,
             tasks=config.workers.tasks,

@@ -46,5 +46,5 @@ def _planners(base: Base) -> Planners:
         chosen,
         memory_mb=planning.memory_mb,
         temporary=base.folders.planning,
-        stays=base.keeps_ready,
+        stays=base.forks_stay,
     )

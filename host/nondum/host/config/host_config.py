@@ -34,8 +34,8 @@ class HostSection:
     """`package:function` that makes the system tree."""
     keep_ready_above_mb: int = 2048
     """A machine with more memory keeps processes ready for what is plugged in or wanted next, which
-    take some 45 MB; another one starts them when they are needed, and ends them after half a
-    minute."""
+    take some 45 MB; another one starts them when they are needed, keeps them while a goal is given
+    or another host is there, and ends them half a minute later."""
 
 
 @frozen

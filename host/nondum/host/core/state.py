@@ -63,6 +63,11 @@ class HostState:
     safety: Safety = Safety.OFF
     """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
 
+    @property
+    def is_at_work(self) -> bool:
+        """Whether it has something to do, or may have at any moment: for a goal, or for a peer."""
+        return bool(self.goals or self.peers)
+
     def key_of(self, digest: str) -> str:
         """What this host calls, or would call, a payload, by the digest of its contents list."""
         return self.keys().get(digest, payload_key.key_of(digest))

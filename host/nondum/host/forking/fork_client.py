@@ -19,6 +19,8 @@ from nondum.sdk.packets import CROWDED_S, CROWDED_TRIES
 
 END_S = 1.0
 """How long a killed server is waited for."""
+REST_S = 10.0
+"""How long a server that need not stay is unused before it ends."""
 
 log = logging.getLogger(__name__)
 
@@ -108,13 +110,13 @@ class ForkClient:
         on_crowded: Callable[[], None] = lambda: None,
         *,
         environment: Mapping[str, str] = MappingProxyType({}),
-        stays: bool = True,
+        stays: Callable[[], bool] | None = None,
     ) -> None:
         """`module` is run as a program with this process's id and the descriptor of its end of the
         channel (`fork_server.serve`), with `environment` added to that of this
         process. `on_crowded` is called when descriptors cannot be sent yet since too many of this
-        user's are under way (ETOOMANYREFS, unix(7)): that is tried again. Unless it `stays`, the
-        server is started when something is forked only, and ends when it is let rest."""
+        user's are under way (ETOOMANYREFS, unix(7)): that is tried again. A server for which
+        `stays` is false ends some time after all that it forked; None: it is always kept."""
         self._module, self._on_crowded, self._stays = module, on_crowded, stays
         self._environment = environment
         self._server: Process | None = None
@@ -123,6 +125,13 @@ class ForkClient:
         self._running: list[Forked] = []
         """Those that may run."""
         self._turn = asyncio.Lock()
+        self._used_s = 0.0
+        self._resting: asyncio.Task[None] | None = None
+
+    @property
+    def stays(self) -> bool:
+        """Whether the server is kept now, whatever runs."""
+        return self._stays is None or self._stays()
 
     @property
     def pid(self) -> int | None:
@@ -152,8 +161,6 @@ class ForkClient:
             if message in self._expected:
                 return
             self._expected.append(message)
-            if self._channel is None and not self._stays:
-                return
             try:
                 if self._channel is None:
                     self._channel = await self._start()
@@ -162,17 +169,23 @@ class ForkClient:
             except OSError as error:
                 log.warning("the fork server cannot prepare for %s: %s", message, error)
 
-    async def rest(self) -> None:
-        """Nothing is to be forked for a while: unless it stays, end the server, if nothing that it
-        forked runs."""
-        async with self._turn:
-            if not self._stays and all(forked.is_over for forked in self._running):
-                await self._end()
-
     async def close(self) -> None:
         """End the server, and all that it forked."""
+        if self._resting is not None:
+            self._resting.cancel()
+            await asyncio.wait([self._resting])
         async with self._turn:
             await self._end()
+
+    async def _rest(self, stays: Callable[[], bool]) -> None:
+        """End the server once it is not used any more."""
+        loop = asyncio.get_running_loop()
+        while self._server is not None:
+            await asyncio.sleep(REST_S)
+            async with self._turn:
+                is_used = loop.time() - self._used_s < REST_S
+                if not is_used and not stays() and all(one.is_over for one in self._running):
+                    await self._end()
 
     async def _in_turn(self, message: str, patience_s: float) -> Forked:
         async with self._turn:
@@ -213,6 +226,9 @@ class ForkClient:
             except BaseException:
                 channel.close()
                 raise
+        self._used_s = asyncio.get_running_loop().time()
+        if self._stays is not None and (self._resting is None or self._resting.done()):
+            self._resting = asyncio.create_task(self._rest(self._stays))
         return channel
 
     async def _fork(self, channel: socket.socket, message: str) -> Forked:
@@ -248,6 +264,7 @@ class ForkClient:
             forked = Forked(pid, descriptor, status, ours)
             failed.pop_all()
             self._running = [*(other for other in self._running if not other.is_over), forked]
+            self._used_s = asyncio.get_running_loop().time()
             return forked
 
     async def _end(self) -> None:

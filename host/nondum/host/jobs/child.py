@@ -63,7 +63,9 @@ def work() -> None:
 
 def _prepare(name: bytes) -> None:
     """Import what a child is to do, once for all that will do it."""
-    _import(name.decode())
+    jobs = table.AT_ONCE if name.decode() == table.ANY else (name.decode(),)
+    for job in jobs:
+        _import(job)
     gc.freeze()  # a collection in a child would make pages its own that are shared
 
 

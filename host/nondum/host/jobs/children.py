@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.forking.fork_client import ForkClient, Forked
-from nondum.host.jobs.table import LONGEST, PROGRESS, Progress
+from nondum.host.jobs.table import ANY, LONGEST, PROGRESS, Progress
 from nondum.host.rpc.child_link import ChildLink
 from nondum.host.rpc.outcomes import unpacked
 from nondum.sdk.errors import InstallFailed, LinkClosed, Problem
@@ -32,6 +32,9 @@ KEPT = 4
 
 QUIET_S = 30.0
 """Without work for so long, no child is kept."""
+
+AHEAD_S = 1.0
+"""Without work for so long, a child is forked ahead for an owner who is not known yet."""
 
 STALL_S = 60.0
 """Read timeout of a job process, unless its job reports progress more often or more rarely."""
@@ -99,18 +102,22 @@ class Children:
         *,
         quiet_s: float = QUIET_S,
         on_crowded: Callable[[], None] = lambda: None,
-        stays: bool = True,
+        stays: Callable[[], bool] | None = None,
     ) -> None:
-        """`on_crowded`, and whether the fork server `stays`: see `ForkClient`."""
+        """`on_crowded`, and whether the fork server `stays`: see `ForkClient`. A child is forked
+        ahead where it always does."""
         self._quiet_s = quiet_s
+        self._forks_ahead = stays is None
         self.forks = ForkClient("nondum.host.jobs.child", on_crowded, stays=stays)
         """What they are forked by, and services of the host beside them (`jobs.SERVICES`)."""
         self._kept: dict[str, _Child] = {}
         """Owner → the child that worked for this owner only; the last ones last."""
+        self._ahead: _Child | None = None
+        """Has read nothing, and works for the next owner."""
         self._busy: set[_Child] = set()
         self._left_behind: set[_Child] = set()
         """Those that were killed and have not ended yet: a disk may hold one for ever."""
-        self._shrinking: asyncio.Task[None] | None = None
+        self._resting: asyncio.Task[None] | None = None
 
     async def run(
         self,
@@ -165,7 +172,7 @@ class Children:
 
     def pids(self) -> set[int]:
         """Processes of all children."""
-        return {child.process.pid for child in (*self._kept.values(), *self._busy)}
+        return {child.process.pid for child in self._all()}
 
     @property
     def server(self) -> int | None:
@@ -178,19 +185,29 @@ class Children:
 
     async def close(self) -> None:
         """Kill all children."""
-        if self._shrinking is not None:
-            self._shrinking.cancel()
-            await asyncio.wait([self._shrinking])
-        everyone = {*self._kept.values(), *self._busy, *self._left_behind}
-        await asyncio.gather(*(self._end(child) for child in everyone))
+        if self._resting is not None:
+            self._resting.cancel()
+            await asyncio.wait([self._resting])
+        everyone = {*self._all(), *self._left_behind}
         self._kept.clear()
+        self._ahead = None
+        await asyncio.gather(*(self._end(child) for child in everyone))
         for child in self._left_behind:
             child.close()
         await self.forks.close()
 
     async def _take(self, owner: str, job: str) -> _Child:
         """A child that has read no bytes of another owner."""
-        return self._kept.pop(owner, None) or await self._spawn(job)
+        if owner in self._kept:
+            return self._kept.pop(owner)
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None and not ahead.process.is_over:
+            return ahead
+        return await self._spawn(job)
+
+    def _all(self) -> set[_Child]:
+        waiting = (self._ahead,) if self._ahead is not None else ()
+        return {*self._kept.values(), *self._busy, *waiting}
 
     async def _spawn(self, job: str) -> _Child:
         """A new child.
@@ -228,15 +245,21 @@ class Children:
             await self._end(over)
 
     def _tend(self) -> None:
-        if self._shrinking is not None:
-            self._shrinking.cancel()
-        self._shrinking = asyncio.create_task(self._shrink())
+        if self._resting is not None:
+            self._resting.cancel()
+        self._resting = asyncio.create_task(self._rest())
 
-    async def _shrink(self) -> None:
-        await asyncio.sleep(self._quiet_s)
+    async def _rest(self) -> None:
+        """Fork the next child; later, end those that are kept."""
+        loop = asyncio.get_running_loop()
+        until_s = loop.time() + self._quiet_s
+        await asyncio.sleep(min(AHEAD_S, self._quiet_s))
+        if self._forks_ahead and (self._ahead is None or self._ahead.process.is_over):
+            with contextlib.suppress(InstallFailed):  # the next owner is told
+                self._ahead = await self._spawn(ANY)
+        await asyncio.sleep(until_s - loop.time())
         while self._kept:
             await self._end(self._kept.pop(next(iter(self._kept))))
-        await self.forks.rest()
 
     async def _end(self, child: _Child) -> None:
         self._busy.discard(child)

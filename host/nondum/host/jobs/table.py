@@ -59,6 +59,8 @@ the fork server."""
 
 AT_ONCE = ("look", "copy", "verify", "install", "restore")
 """What people wait for: a child that has time imports these before it is asked."""
+ANY = "any"
+"""Asks for a child that is to do any of these."""
 
 
 def find(name: str) -> Job:

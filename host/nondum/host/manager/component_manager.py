@@ -173,10 +173,10 @@ class ComponentManager:
         may_wait = all(type(event) in HELD for event, _ in (*batch, *told))
         await self._commit(outcome.state, told, may_wait=may_wait and bool(batch))
         self._executor.adopt(outcome.state)
+        for effect in outcome.effects:  # first: a person waits for what comes of them
+            self._executor.start(effect)
         early = {id(event) for event, _ in batch if self._bus.is_told_early(event)}
         self._bus.tell([event for event in outcome.events if id(event) not in early])
-        for effect in outcome.effects:
-            self._executor.start(effect)
 
     async def _commit(
         self, after: HostState, told: Sequence[Stamped], *, may_wait: bool = False

@@ -61,7 +61,7 @@ class Executor:
     ) -> None:
         options = options or InstallOptions()
         self._workers, self._emit = workers, emit
-        self.children = Children(on_crowded=workers.search.begin, stays=options.keeps_ready)
+        self.children = Children(on_crowded=workers.search.begin, stays=options.forks_stay)
         self.trust = PayloadTrust(
             host, folders, self.children, options.trust, allow_unsigned=options.allow_unsigned
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
 
 from nondum.host.manager.drive_reading import LOOK_S
@@ -23,8 +24,8 @@ class InstallOptions:
     """Disk that is left free."""
     quota_mb: int = 4096
     """Size that the store is pruned to."""
-    keeps_ready: bool = True
-    """Whether what children are forked from stays when nothing is to be done."""
+    forks_stay: Callable[[], bool] | None = None
+    """Whether what children are forked from stays when none of them runs; None: always."""
     limits: Limits = field(default_factory=Limits)
     """Of each worker."""
     trust: TrustOptions = field(default_factory=TrustOptions)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,7 +35,7 @@ _T = TypeVar("_T")
 
 
 def planner_forks(
-    environment: Mapping[str, str] | None = None, *, stays: bool = True
+    environment: Mapping[str, str] | None = None, *, stays: Callable[[], bool] | None = None
 ) -> ForkClient:
     """The fork server of planners, with `environment` added to that of this process; whether it
     `stays` when no planner has a task: see `ForkClient`. Close it."""
@@ -133,7 +133,6 @@ class PlannerProcess:
             now_s = asyncio.get_running_loop().time()
             if self._resting is not None and self._resting.when() <= now_s:
                 await self._kill()
-                await self._forks.rest()
 
     def _refusal(self, request: wire.Request) -> str:
         """Why the planner is not one for a task; empty if it is."""

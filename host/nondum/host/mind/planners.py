@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -72,7 +72,7 @@ class Planners:
         *,
         memory_mb: int,
         temporary: Path | None = None,
-        stays: bool = True,
+        stays: Callable[[], bool] | None = None,
     ) -> Planners:
         """Planners by name: `module:Class`; whether what they are forked from `stays`."""
         forks = planner_forks(stays=stays)
@@ -88,9 +88,10 @@ class Planners:
         return tuple(process.name for process in self._processes)
 
     async def warm(self) -> None:
-        """Have every planner imported, one after the other."""
-        for process in self._processes:
-            await process.warm()
+        """Have every planner imported, one after the other, where what has imported them stays."""
+        if self._forks is not None and self._forks.stays:
+            for process in self._processes:
+                await process.warm()
 
     async def plan(
         self, task: GroundTask, deadline_s: float, text: TaskText | None = None
