@@ -274,6 +274,26 @@ async def test_child_that_died_waiting_is_replaced(tmp_path: Path, clock: Virtua
         assert await pool.run("look", drive(tmp_path), owner="a") == NOTHING
 
 
+async def test_none_is_forked_ahead_while_another_works(
+    tmp_path: Path, clock: VirtualClock
+) -> None:
+    """A server that does not answer in time is killed, and with it all that it has forked."""
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        works = pool.run("verify", staged_fifo(tmp_path), stall_s=100 * START_S)
+        working = asyncio.create_task(works)
+        await until_async("a child", lambda: len(pool.pids()) == 1)
+        assert pool.server is not None
+        os.kill(pool.server, signal.SIGSTOP)
+        try:
+            await clock.advance(AHEAD_S + 2 * START_S)
+        finally:
+            os.kill(pool.server, signal.SIGCONT)
+        assert not working.done()
+        working.cancel()
+        await asyncio.wait([working])
+
+
 @pytest.mark.parametrize("aside", [False, True])
 async def test_fork_server_that_does_not_stay_ends_after_the_last_child(
     tmp_path: Path, clock: VirtualClock, aside: bool

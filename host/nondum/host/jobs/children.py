@@ -254,7 +254,8 @@ class Children:
         loop = asyncio.get_running_loop()
         until_s = loop.time() + self._quiet_s
         await asyncio.sleep(min(AHEAD_S, self._quiet_s))
-        if self._forks_ahead and (self._ahead is None or self._ahead.process.is_over):
+        is_missing = self._ahead is None or self._ahead.process.is_over
+        if self._forks_ahead and is_missing and not self._busy:
             with contextlib.suppress(InstallFailed):  # the next owner is told
                 self._ahead = await self._spawn(ANY)
         await asyncio.sleep(until_s - loop.time())
