@@ -256,7 +256,7 @@ class Children:
         await asyncio.sleep(min(AHEAD_S, self._quiet_s))
         is_missing = self._ahead is None or self._ahead.process.is_over
         if self._forks_ahead and is_missing and not self._busy:
-            with contextlib.suppress(InstallFailed):  # the next owner is told
+            with contextlib.suppress(InstallFailed):  # `run` raises it, if it is so then, too
                 self._ahead = await self._spawn(ANY)
         await asyncio.sleep(until_s - loop.time())
         while self._kept:
