@@ -33,9 +33,10 @@ from tests.lab.software import PYTHON
 
 MUCH = 10_000
 """Rows: all of a journal."""
-SPEED = 0.25
-"""Of the recording: an emulated processor finds people in an image a second or two; more slowly,
-images would come so seldom that the stream counts as stalled."""
+SPEED = 0.1
+"""Of the recording: an emulated processor needs a second or two to make an image, and as long to
+find people in it; faster, the first image that differs would come so late that the stream counts as
+stalled (see `nondum.sdk.pace`)."""
 SLOW = {
     CAMERA: f'pace = "every-frame"\nspeed = {SPEED}\n',
     "people-detector": "scale = 1.1\n",
