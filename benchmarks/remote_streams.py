@@ -284,10 +284,11 @@ async def measure(design: Design, bytes_s: float, seconds: float) -> Figures:
     )
 
 
+OURS, CURVE = "nondum bridges", "ZeroMQ PUB/SUB, CURVE"
 DESIGNS: dict[str, Design] = {
-    "nondum bridges": by_bridges,
+    OURS: by_bridges,
     "the same, raw only": by_bridges_raw,
-    "ZeroMQ PUB/SUB, CURVE": lambda run: by_zmq(run, curve=True),
+    CURVE: lambda run: by_zmq(run, curve=True),
     "ZeroMQ PUB/SUB": lambda run: by_zmq(run, curve=False),
 }
 Found = dict[tuple[str, str], list[Figures]]
@@ -311,13 +312,16 @@ COLUMNS: dict[str, tuple[str, float, str]] = {
 
 
 def section(found: Found, link: str) -> str:
-    rows = []
-    for design in DESIGNS:
-        spreads = (
-            format(Spread(tuple(getattr(one, f) * unit for one in found[design, link])), style)
-            for f, unit, style in COLUMNS.values()
-        )
-        rows.append([design, *spreads])
+    spreads = {
+        design: [
+            Spread(tuple(getattr(one, f) * unit for one in found[design, link]))
+            for f, unit, _ in COLUMNS.values()
+        ]
+        for design in DESIGNS
+    }
+    styles = [style for _, _, style in COLUMNS.values()]
+    rows = [[design, *map(format, spread, styles)] for design, spread in spreads.items()]
+    rows.append(["bridges ÷ ZeroMQ, CURVE", *map(measuring.ratio, spreads[OURS], spreads[CURVE])])
     raw_mb_s = WIDTH * HEIGHT * 3 * RATE_HZ / 1e6
     bytes_s = LINKS[link]
     carries = "more than enough" if math.isinf(bytes_s) else f"{bytes_s / 1e6:g} MB/s"

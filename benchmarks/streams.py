@@ -204,6 +204,11 @@ class Figures:
     frames_s: float
     """Per reader, at the pace of the slowest."""
 
+    @property
+    def cpu_us(self) -> float:
+        """Of all processes, per frame."""
+        return self.producer_cpu_us + self.reader_cpu_us
+
 
 async def paced(send: Send, frames: int) -> float:
     """Send at 30 Hz; give the CPU seconds used."""
@@ -273,6 +278,7 @@ COLUMNS = {
     "p99 µs": ("p99_us", ",.0f"),
     "producer CPU µs per frame": ("producer_cpu_us", ".0f"),
     "readers' CPU µs per frame": ("reader_cpu_us", ".0f"),
+    "all CPU µs per frame": ("cpu_us", ".0f"),
     "fastest: frames/s per reader": ("frames_s", ",.0f"),
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import gc
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NoReturn, TypeVar
@@ -173,6 +173,7 @@ def page(rounds: Sequence[Round]) -> str:
         ]
         for phase in PHASES
     ]
+    rows.append(["merge, ground, plan", *(f"{spread:.1f}" for spread in _planned(rounds))])
     rows.append(["all", f"{first:.1f}", f"{more:.1f}"])
     header = ["", f"{PRESENT} strangers: ms", "one more: ms"]
     return f"""# From fragments to a running plan
@@ -195,6 +196,16 @@ problem in {theirs:.0f} ms; nondum's parse, check and ground take {ratio(front, 
 
 Machine: {machine()}.
 """
+
+
+def _planned(rounds: Sequence[Round]) -> tuple[Spread, Spread]:
+    """What it takes once the texts are read."""
+    first, more = ([getattr(r, which).phases_ms for r in rounds] for which in ("first", "more"))
+    return (_sums(first), _sums(more))
+
+
+def _sums(phases: Sequence[Mapping[str, float]]) -> Spread:
+    return Spread(tuple(one["merge"] + one["ground"] + one["plan"] for one in phases))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ ROWS: Sequence[tuple[str, str, Shown]] = (
     ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),
     ("planners, all of them", "", lambda f: f"{f.mb_of('planner'):.1f} MB"),
     ("a child for drives, waiting", "", lambda f: f"{f.mb_of('drive child'):.1f} MB"),
+    ("all of it", "≤ 100 MB", lambda f: f"{f.all_mb:.1f} MB"),
     ("the links to peers, in a separate process", "", lambda f: _mb(f.apart_mb("links"))),
     ("… and the idle daemon then", "≤ 60 MB", lambda f: _mb(f.apart_mb("daemon"))),
     ("processor at idle, the daemon", "≤ 1 %", lambda f: f"{f.idle['cpu_percent']:.2f} %"),

@@ -40,6 +40,11 @@ class Footprint:
         """That of the worker: the greatest of them, the other being the spare."""
         return float(max(self.with_worker["worker"])) * 1024 / 1e6
 
+    @property
+    def all_mb(self) -> float:
+        """That of the idle daemon and all that it keeps ready."""
+        return sum(map(self.mb_of, self.idle["memory_kb"]))
+
     def apart_mb(self, kind: str) -> float | None:
         """That of the processes of a kind, beside a process for links to peers."""
         return sum(self.apart[kind]) * 1024 / 1e6 if self.apart else None

@@ -1,0 +1,1 @@
+"""What the benchmarks are to show, beside what they have shown."""
