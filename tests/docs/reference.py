@@ -25,6 +25,7 @@ from nondum.host.config import host_config, parsing
 from nondum.host.config import reference as keys_of
 from nondum.host.config.effective import as_toml
 from nondum.host.extension import hookspecs
+from nondum.planning.pddl import tables
 from nondum.sdk import hooks
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -32,6 +33,8 @@ TOLD = Path(explain.__file__).with_name(explain.TOLD)
 """What `nondum explain` quotes; it ships with nondum, which does not read its own sources."""
 KEYS = Path(keys_of.__file__).with_name(keys_of.KEYS)
 """What `nondum config explain` quotes."""
+TABLES = Path(tables.__file__).parent / "grammar" / tables.TABLES
+"""What lark makes of the grammar of PDDL."""
 MARK = "<!-- What follows is written by `python -m tests.docs.reference`. -->\n"
 
 
@@ -169,6 +172,8 @@ def main() -> None:
         path.write_text(f"{words}{MARK}\n{make()}", encoding="utf-8")
     KEYS.write_text(configuration_keys(), encoding="utf-8")
     TOLD.write_text(codes.told_words(), encoding="utf-8")
+    if not tables.are_current():
+        TABLES.write_text(tables.made(), encoding="utf-8")
     packages.draw()
 
 

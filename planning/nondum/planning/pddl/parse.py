@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from importlib import resources
 from threading import Lock
 from typing import cast
 
-from lark import Lark, Token, UnexpectedCharacters, UnexpectedInput
+from lark import Token, UnexpectedCharacters, UnexpectedInput
 
 from nondum.planning.pddl.build import Builder
 from nondum.planning.pddl.caret import Misplaced, nearest, refusal, shown
 from nondum.planning.pddl.syntax import Formula, FragmentSyntax, Place, PredicateDeclaration
+from nondum.planning.pddl.tables import parser_of
 from nondum.sdk.errors import FragmentRefused, Problem
 
 SIZE_LIMIT_BYTES = 256 * 1024
@@ -79,19 +79,12 @@ def parse_signature(text: str, file: str) -> PredicateDeclaration:
 
 
 class _Parser:
-    """The grammar, prepared once. It builds while it parses, which spares it a tree."""
+    """The grammar, prepared once."""
 
     def __init__(self) -> None:
-        grammar = resources.files(__package__) / "grammar" / "pddl.lark"
         self._builder = Builder()
         self._one_at_a_time = Lock()
-        self._lark = Lark(
-            grammar.read_text(encoding="utf-8"),
-            parser="lalr",
-            start=["fragment", "formula", "signature"],
-            maybe_placeholders=False,
-            transformer=self._builder,
-        )
+        self._lark = parser_of(self._builder)
 
     def parse(self, text: str, file: str, start: str) -> object:
         """Raises `UnexpectedInput` or `Misplaced`."""
