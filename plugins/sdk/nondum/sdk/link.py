@@ -107,6 +107,8 @@ class Link:
         self._ids = itertools.count(1)
         self._pending: dict[int, Pending] = {}
         self._running: dict[int, asyncio.Task[None]] = {}
+        self._not_begun: dict[int, tuple[Handle, ...]] = {}
+        """Requests whose tasks have not taken their first step, and their handles."""
         self._greeting: asyncio.Future[Hello | Welcome] = asyncio.get_running_loop().create_future()
         self.is_closed = False
         is_socket = isinstance(sock, socket.socket)
@@ -184,8 +186,8 @@ class Link:
             return
         self.is_closed = True
         self._packets.close()
-        for task in self._running.values():
-            task.cancel()
+        for call_id in tuple(self._running):
+            self._halt(call_id)
         for call in self._pending.values():
             call.fail(_closed())
         self._pending.clear()
@@ -235,7 +237,7 @@ class Link:
                 self._serve(message, handles)
             case Cancel(call_id):
                 if call_id in self._running:
-                    self._running[call_id].cancel()
+                    self._halt(call_id)
             case Hello() | Welcome():
                 if self._greeting.done():
                     raise ProtocolViolation(Problem("HANDSHAKE", "the handshake came twice"))
@@ -276,12 +278,13 @@ class Link:
             raise ProtocolViolation(
                 Problem("NO_CREDIT", f"more than {self._credit} requests at once")
             )
-        task = asyncio.get_running_loop().create_task(self._work(request, handles))
-        self._running[request.id] = task
-        task.add_done_callback(lambda _: self._give_up(request.id, handles))
+        self._not_begun[request.id] = handles
+        loop = asyncio.get_running_loop()
+        self._running[request.id] = loop.create_task(self._work(request, handles))
 
     async def _work(self, request: Request, handles: tuple[Handle, ...]) -> None:
         """Carry a request out and answer it."""
+        del self._not_begun[request.id]
         answer: Reply | Failure
         try:
             body = await self._on_request(request.verb, dict(request.body), handles, request.id)
@@ -296,9 +299,10 @@ class Link:
             answer = Failure(request.id, (Problem(_code_of(error), told),))
         self._answer(answer)
 
-    def _give_up(self, call_id: int, handles: tuple[Handle, ...]) -> None:
-        """Answer a request that was cancelled before its first step."""
-        if call_id in self._running:
+    def _halt(self, call_id: int) -> None:
+        """Cancel a request; one that has not begun never will, so it is answered here."""
+        self._running[call_id].cancel()
+        if (handles := self._not_begun.pop(call_id, None)) is not None:
             discard(handles)
             self._answer(_halted(call_id))
 
