@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.campaign.progress import Limit, Round, work_off
@@ -75,8 +75,14 @@ def _run(labs: list[Lab], known: dict[str, Scenario], due: Round, asked: argpars
         for lab in labs:
             lab.close()
 
-    names = due.due() if asked.folder else iter(due.pieces)
-    work_off(names, len(labs), try_one, end)
+    def some(*, is_alone: bool) -> Iterator[str]:
+        names = due.due() if asked.folder else iter(due.pieces)
+        return (name for name in names if known[name].is_alone is is_alone)
+
+    work_off(some(is_alone=False), len(labs), try_one, end)
+    for lab in labs[1:]:
+        lab.close()
+    work_off(some(is_alone=True), 1, try_one, end)
     failed = sum(1 for r in results if r.failure)
     for result in results:
         if result.failure:

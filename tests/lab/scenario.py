@@ -30,6 +30,8 @@ class Scenario:
     """What holds."""
     run: Callable[[Lab], str | None]
     """Does it; answers what is worth saying of it, and raises when it does not hold."""
+    is_alone: bool = False
+    """Whether no other runs beside it: it holds the robot to what is promised in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,4 +105,5 @@ def keep(name: str, lab: Lab) -> Path:
 def _loaded(path: Path) -> Scenario:
     module = importlib.import_module(f"{PACKAGE}.{path.stem}")
     sentence = (module.__doc__ or "").strip().splitlines()[0]
-    return Scenario(path.stem.replace("_", "-"), sentence, module.run)
+    is_alone = getattr(module, "ALONE", False)
+    return Scenario(path.stem.replace("_", "-"), sentence, module.run, is_alone)

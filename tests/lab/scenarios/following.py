@@ -21,6 +21,8 @@ from tests.lab.demonstration import FollowedStream
 from tests.lab.lab import Lab
 from tests.lab.robot import MachineRobot
 
+ALONE = True
+"""A behaviour halts within 2 s, which another machine's start beside it takes from it."""
 SPEED = 0.1
 """Of the recording: an emulated processor finds people in an image a second or two."""
 PLAYED = f'pace = "every-frame"\nspeed = {SPEED}\n'

@@ -33,6 +33,8 @@ from tests.lab.software import PYTHON
 
 MUCH = 10_000
 """Rows: all of a journal."""
+ALONE = True
+"""Three machines are as many as two processors can emulate."""
 SPEED = 0.1
 """Of the recording: an emulated processor needs a second or two to make an image, and as long to
 find people in it; faster, the first image that differs would come so late that the stream counts as
