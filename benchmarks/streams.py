@@ -2,8 +2,9 @@
 
 Frames of 921,600 bytes (640×480, bgr8) to one and to three readers, all designs in one run, repeat
 by repeat in turn: paced at 30 Hz for latency and CPU, and as fast as the slowest reader takes them
-for throughput. Every reader ends up with an `Image` and reads all its pixels. Writes
-docs/benchmarks/streams.md.
+for throughput. Every reader ends up with an `Image` and reads all its pixels. Beside them is the
+least that processes can do: a ring of shared memory, a packet for each frame, readers that block,
+nothing released and nothing checked. Writes docs/benchmarks/streams.md.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import argparse
 import asyncio
 import contextlib
 import json
+import mmap
 import os
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -40,6 +43,9 @@ HIGH_WATER_MARK = 16
 WINDOW = 2
 """Frames under way in the throughput runs."""
 READERS = (1, 3)
+RING = struct.Struct("<Qd")
+"""A frame of the bare ring: its number, and when it was made."""
+RING_SLOTS = 4
 FRAMES = tuple(bytes([shade]) * (WIDTH * HEIGHT * 3) for shade in range(4))
 
 Send = Callable[[Image], None]
@@ -104,10 +110,23 @@ def read_zmq(notes: Notes, address: str, *, copy: bool) -> None:
     subscriber.close(linger=0)
 
 
+def read_ring(notes: Notes, descriptors: list[int]) -> None:
+    packets, *slots = descriptors
+    sock = socket.socket(fileno=packets)
+    memory = [memoryview(mmap.mmap(slot, 0, prot=mmap.PROT_READ)) for slot in slots]
+    print("ready", flush=True)
+    while packet := sock.recv(RING.size):
+        seq, stamp_s = RING.unpack(packet)
+        header = Header(stamp_s=stamp_s, frame_id="camera", seq=seq)
+        notes.take(Image(header, HEIGHT, WIDTH, "bgr8", WIDTH * 3, memory[seq % RING_SLOTS]))
+
+
 def read(kind: str, where: str, acknowledge: int) -> None:
     notes = Notes(acknowledge)
     if kind == "slots":
         asyncio.run(read_slots(notes, int(where)))
+    elif kind == "ring":
+        read_ring(notes, [int(descriptor) for descriptor in where.split(",")])
     else:
         read_zmq(notes, where, copy=kind == "zmq-copy")
     notes.report()
@@ -168,6 +187,35 @@ def by_slots(readers: Readers, count: int) -> Iterator[Send]:
         theirs.close()
     yield producer.send
     producer.close()
+
+
+@contextlib.contextmanager
+def by_ring(readers: Readers, count: int) -> Iterator[Send]:
+    size = WIDTH * HEIGHT * 3
+    slots = [os.memfd_create("ring") for _ in range(RING_SLOTS)]
+    for slot in slots:
+        os.truncate(slot, size)
+    memory = [mmap.mmap(slot, size) for slot in slots]
+    ends = []
+    for _ in range(count):
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        descriptors = (theirs.fileno(), *slots)
+        readers.start("ring", ",".join(map(str, descriptors)), *descriptors)
+        theirs.close()
+        ends.append(ours)
+
+    def send(image: Image) -> None:
+        seq = image.header.seq
+        memory[seq % RING_SLOTS][:] = image.data
+        packet = RING.pack(seq, image.header.stamp_s)
+        for end in ends:
+            end.send(packet)
+
+    yield send
+    for end in ends:
+        end.close()
+    for slot in slots:
+        os.close(slot)
 
 
 @contextlib.contextmanager
@@ -260,6 +308,7 @@ DESIGNS: dict[str, Design] = {
     "nondum slots": by_slots,
     "ZeroMQ ipc": lambda readers, count: by_zmq(readers, count, copy=True),
     "ZeroMQ ipc, copy=False": lambda readers, count: by_zmq(readers, count, copy=False),
+    "a bare ring": by_ring,
 }
 Found = dict[tuple[str, int], list[Figures]]
 
@@ -313,7 +362,8 @@ the reader has an `Image` and has read all its pixels once. {repeats} repeats in
 frames at {RATE_HZ} Hz and {10 * frames} at most {WINDOW} ahead of the slowest reader; medians of
 the repeats (lowest-highest).
 ZeroMQ: XPUB and SUB, two parts, high-water mark {HIGH_WATER_MARK}, readers that block; the readers
-of slots run an asyncio loop, as workers do.
+of slots run an asyncio loop, as workers do. The bare ring is the least that such processes take:
+shared memory, a packet for each frame, readers that block, nothing released and nothing checked.
 
 {sections}
 Machine: {measuring.machine()}; pyzmq {zmq.__version__}, libzmq {zmq.zmq_version()}.
