@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -15,6 +17,11 @@ from benchmarks.recompose.processes import await_rest
 from tests.daemon.plugins import talker
 from tests.kit.payloads import make_payload
 
+PACKAGES = (
+    "asyncio, ifaddr, importlib_metadata, lark, msgpack, packaging, pluggy, py_trees, pyudev, "
+    "sqlite3, ssl, zmq"
+)
+"""What a daemon imports that is not nondum's."""
 STARTS = 3
 SETTLED_S = 60.0
 """After a start: half a minute later it is written that nothing went wrong."""
@@ -49,6 +56,7 @@ def _measured(folder: Path, seconds: float) -> results.Footprint:
         yardstick_s=probe.yardstick(),
         idle=idle,
         with_worker=with_worker,
+        packages_kb=_packages_kb(),
     )
 
 
@@ -59,6 +67,17 @@ def _apart(folder: Path) -> dict[str, list[int]]:
         time.sleep(SETTLED_S)
         await_rest(pid, timeout_s=PATIENCE_S)
         return probe.memory(pid)
+
+
+def _packages_kb() -> int:
+    """Proportional set size of an interpreter that has imported `PACKAGES`."""
+    command = [sys.executable, "-I", "-c", f"import {PACKAGES}; print(flush=True); input()"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        found = probe.pss_kb(process.pid)
+        process.kill()
+    return found
 
 
 def _start(folder: Path) -> tuple[float, float]:

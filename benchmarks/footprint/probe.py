@@ -55,9 +55,9 @@ def look(daemon: int, seconds: float) -> dict[str, Any]:
 
 def memory(daemon: int) -> dict[str, list[int]]:
     """Proportional set size of each process, by kind, the greatest first."""
-    found: dict[str, list[int]] = {"daemon": [_pss_kb(daemon)]}
+    found: dict[str, list[int]] = {"daemon": [pss_kb(daemon)]}
     for pid in _descendants(daemon):
-        found.setdefault(_kind(pid), []).append(_pss_kb(pid))
+        found.setdefault(_kind(pid), []).append(pss_kb(pid))
     return {kind: sorted(sizes, reverse=True) for kind, sizes in found.items()}
 
 
@@ -104,7 +104,8 @@ def _kind(pid: int) -> str:
     return next((kind for part, kind in KINDS.items() if part in said), "other")
 
 
-def _pss_kb(pid: int) -> int:
+def pss_kb(pid: int) -> int:
+    """Proportional set size of a process; 0: it is gone."""
     try:
         text = (PROC / f"{pid}/smaps_rollup").read_text(encoding="ascii")
     except OSError:

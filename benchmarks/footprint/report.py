@@ -12,6 +12,7 @@ METHOD = Path(__file__).with_name("method.md")
 Shown = Callable[[Footprint], str]
 ROWS: Sequence[tuple[str, str, Shown]] = (
     ("memory of the idle daemon", "≤ 60 MB", lambda f: f"{f.daemon_mb:.1f} MB"),
+    ("… of an interpreter with its packages alone", "", lambda f: _mb(f.packages_mb)),
     ("a worker, its plugin importing nothing", "≤ 20 MB", lambda f: f"{f.worker_mb:.1f} MB"),
     ("a worker's init (process 1 of its sandbox)", "", lambda f: f"{f.mb_of('init'):.1f} MB"),
     ("the spare worker", "", lambda f: f"{f.mb_of('worker'):.1f} MB"),

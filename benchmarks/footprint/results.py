@@ -29,6 +29,14 @@ class Footprint:
     """`probe.memory` with the worker, in kB."""
     apart: dict[str, list[int]] = field(default_factory=dict)
     """That of the host alone, with a process for its links to peers; empty where not measured."""
+    packages_kb: int | None = None
+    """That of an interpreter which imports the packages of others that a daemon does, and no more;
+    None where not measured."""
+
+    @property
+    def packages_mb(self) -> float | None:
+        """That of an interpreter with the packages of others alone."""
+        return None if self.packages_kb is None else self.packages_kb * 1024 / 1e6
 
     @property
     def daemon_mb(self) -> float:
