@@ -59,7 +59,11 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/trust/editing.py": (f"{_TW}/trust/test_editing.py",),
     f"{_W}/trust/owners_folder.py": (f"{_TW}/trust/test_editing.py",),
     f"{_W}/trust/signing.py": (f"{_TW}/trust/test_signing.py",),
-    f"{_W}/format/signatures.py": (f"{_TW}/trust/test_judging.py", f"{_TW}/test_goal_payload.py"),
+    f"{_W}/format/signatures.py": (
+        f"{_TW}/trust/test_judging.py",
+        f"{_TW}/test_goal_payload.py",
+        f"{_TW}/test_limits.py",
+    ),
     f"{_H}/trust/anchors.py": (f"{_TH}/trust/test_anchors.py",),
     f"{_H}/trust/chain.py": (f"{_TH}/trust/test_chain.py",),
     f"{_H}/manager/payload_trust.py": _BROUGHT,
@@ -86,6 +90,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/format/contents.py": (f"{_TW}/test_contents.py",),
     f"{_W}/format/names.py": (f"{_TW}/test_names.py",),
     f"{_W}/format/tables.py": (f"{_TW}/test_manifest.py", f"{_TW}/trust/test_trust_file.py"),
+    f"{_W}/format/limits.py": (f"{_TW}/test_limits.py",),
     f"{_W}/format/manifest.py": (f"{_TW}/test_manifest.py",),
     f"{_W}/format/confinement.py": (f"{_TW}/test_confinement.py",),
     f"{_W}/format/lock.py": (f"{_TW}/test_lock.py",),
@@ -95,6 +100,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_W}/build/verification.py": (f"{_TW}/test_verification.py",),
     f"{_W}/payload/preflight.py": (
         f"{_TW}/test_preflight.py",
+        f"{_TW}/test_limits.py",
         f"{_TW}/test_payload.py",
         f"{_TW}/test_verification.py",
     ),

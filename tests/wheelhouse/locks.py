@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from packaging.tags import Tag, compatible_tags, cpython_tags
 
+from nondum.wheelhouse.format import lock
+from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.lock import Lock
+from nondum.wheelhouse.payload.host_facts import HostFacts
+from nondum.wheelhouse.payload.memory import Memory
+
 SHA = "b" * 64
 
 
@@ -41,3 +47,22 @@ def host(python: tuple[int, int], machine: str) -> tuple[dict[str, str], list[Ta
         *compatible_tags(python, f"cp{python[0]}{python[1]}", platforms),
     ]
     return environment, tags
+
+
+ENVIRONMENT, TAGS = host((3, 11), "x86_64")
+FACTS = HostFacts(
+    architecture="x86_64",
+    python="3.11.4",
+    environment=ENVIRONMENT,
+    tags=tuple(TAGS),
+    free_disk_mb=1000,
+    memory=Memory(1000),
+    confinement=Level.RESTRICTED,
+    nondum="0.1.0",
+)
+
+
+def locked(component: str, tag: str = "py3-none-any", more: str = "", size: int = 3) -> Lock:
+    one = wheel(f"dist_{component}-1.0-{tag}.whl").replace("size = 3", f"size = {size}")
+    text = HEAD + package(f"dist-{component}", "1.0", one, more=more)
+    return lock.parse(text, f"pylock.{component}.toml")

@@ -9,39 +9,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.wheelhouse.locks import HEAD, host, package, wheel
+from tests.wheelhouse.locks import FACTS, locked
 
 from nondum.sdk.errors import PayloadRefused
-from nondum.wheelhouse.format import lock, manifest
+from nondum.wheelhouse.format import manifest
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.lock import Lock
 from nondum.wheelhouse.payload.host_facts import HostFacts, probe
-from nondum.wheelhouse.payload.memory import Memory
 from nondum.wheelhouse.payload.preflight import preflight, select, unmet
-
-ENVIRONMENT, TAGS = host((3, 11), "x86_64")
-FACTS = HostFacts(
-    architecture="x86_64",
-    python="3.11.4",
-    environment=ENVIRONMENT,
-    tags=tuple(TAGS),
-    free_disk_mb=1000,
-    memory=Memory(1000),
-    confinement=Level.RESTRICTED,
-    nondum="0.1.0",
-)
 
 
 def said(requires: str = "", components: tuple[str, ...] = ("a",)) -> manifest.Manifest:
     tables = "".join(f'[[component]]\nid = "{c}"\ndistribution = "dist-{c}"\n' for c in components)
     text = f'id = "org.example.x"\nname = "x"\n[requires]\n{requires}\n{tables}'
     return manifest.parse(text, "payload.toml")
-
-
-def locked(component: str, tag: str = "py3-none-any", more: str = "", size: int = 3) -> Lock:
-    one = wheel(f"dist_{component}-1.0-{tag}.whl").replace("size = 3", f"size = {size}")
-    text = HEAD + package(f"dist-{component}", "1.0", one, more=more)
-    return lock.parse(text, f"pylock.{component}.toml")
 
 
 def codes(

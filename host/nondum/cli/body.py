@@ -35,6 +35,8 @@ def components(session: Session) -> None:
     columns = ["component", "state", "plugin", "version", "payload", "age", "units"]
     columns += ["confinement", "problem"]
     rows = session.ask("components")
+    if any(row["granted"] for row in rows):
+        columns.insert(columns.index("confinement"), "granted")
     if any(row["was"] for row in rows):
         columns.insert(columns.index("age"), "release")
     if not session.as_json:
@@ -43,6 +45,7 @@ def components(session: Session) -> None:
                 **row,
                 "release": render.release(row),
                 "age": render.age(row["age_s"]),
+                "granted": ", ".join(f"{key} = {most}" for key, most in row["granted"].items()),
                 "problem": render.without_excerpt(row["problem"]),
             }
             for row in rows

@@ -149,6 +149,7 @@ def _view(trust: Trust) -> dict[str, Any]:
                 "keys": list(role.keys),
                 "threshold": role.threshold,
                 "permissions": list(role.permissions),
+                "most": role.most.given(),
             }
             for role in trust.roles
         ],
@@ -181,7 +182,8 @@ def _show(trust: Trust) -> None:
         until = f"  until {_day(key.until)}" if key.until is not None else ""
         click.echo(f"key {key.name}  {key.key.fingerprint}{until}{state}")
     for role in trust.roles:
-        may = ", ".join(role.permissions) or "nothing more"
+        bounds = [f"at most {key} = {most}" for key, most in role.most.given().items()]
+        may = ", ".join((*role.permissions, *bounds)) or "nothing more"
         who = f"{role.threshold} of {', '.join(role.keys)}"
         click.echo(f"role {role.name}: {', '.join(role.payloads)} by {who}; may have {may}")
     for revocation in trust.revoked:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
 from nondum.host.assembly.base import Base
+from nondum.host.config.host_config import WorkersSection
 from nondum.host.core.records.safety import Safety
 from nondum.host.manager.component_manager import ComponentManager
 from nondum.host.manager.effect_handlers import Executor
@@ -14,6 +16,7 @@ from nondum.host.sources.drives.source import DriveSource
 from nondum.host.workers.spec import Limits
 from nondum.host.workers.workers import Workers
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.limits import WorkerLimits
 
 
 @frozen
@@ -55,4 +58,16 @@ def _install_options(base: Base) -> InstallOptions:
             processors=config.workers.cpu_percent / 100,
             scratch_mb=config.workers.scratch_mb,
         ),
+        most=_most(config.workers),
+    )
+
+
+def _most(workers: WorkersSection) -> WorkerLimits:
+    """The most that a worker may ask for."""
+    return WorkerLimits(
+        memory_mb=workers.most_memory_mb or None,
+        tasks=workers.most_tasks,
+        numeric_threads=workers.most_numeric_threads or os.cpu_count(),
+        startup_s=workers.most_startup_s,
+        scratch_mb=workers.most_scratch_mb,
     )

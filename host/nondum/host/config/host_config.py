@@ -107,7 +107,8 @@ class InstallSection:
 
 @frozen
 class WorkersSection:
-    """Limits of each worker: the same for all, and no payload changes them."""
+    """Limits of each worker. A payload may ask for others (`[component.limits]`), up to the most
+    that is set here and that its signer's role may give."""
 
     memory_mb: int = 2048
     """Memory of all its processes, where the machine has the memory cgroup; else the data of each.
@@ -122,6 +123,17 @@ class WorkersSection:
     """Disk that its scratch folder may take; more ends it, and the folder is emptied."""
     startup_s: float = 30.0
     """What a plugin has from its launch until it has started; then it counts as hung."""
+    most_memory_mb: int = 0
+    """The most memory that a payload may ask for a worker; 0: as much as is free."""
+    most_tasks: int = 4096
+    """The most processes and threads that a payload may ask for a worker."""
+    most_numeric_threads: int = 0
+    """The most threads of each numeric library that a payload may ask for a worker, which has one
+    otherwise; 0: as many as the machine has processors."""
+    most_startup_s: int = 600
+    """The longest time to start that a payload may ask for a worker."""
+    most_scratch_mb: int = 4096
+    """The largest scratch folder that a payload may ask for a worker."""
     settle_beats: int = 2
     """Signs of life, two seconds apart, that each worker of a newer release gives before it takes
     over."""

@@ -149,6 +149,7 @@ def component_row(
         "behaviours": [behaviour.name for behaviour in described.behaviours],
         "devices": {claim.name: claim.device for claim in component.devices},
         "pid": pid,
+        "granted": {},
         "problem": "; ".join(str(problem) for problem in component.problems),
     }
 
@@ -173,6 +174,7 @@ def offered_row(component: PeerComponent, host: str) -> Row:
         "behaviours": list(component.abilities),
         "devices": {},
         "pid": None,
+        "granted": {},
         "problem": f"its host does not offer {withheld}" if withheld else "",
     }
 

@@ -95,6 +95,7 @@ class StatusQuestions:
     async def components(self, arguments: Arguments) -> list[Row]:
         """What the robot is made of."""
         pids, since = self.workers.pids(), self.workers.since_wall_s()
+        asked = self.workers.asked()
         snapshot = self.catalogue.snapshot()
         payloads = {payload.key: payload for payload in snapshot.payloads}
         own = [
@@ -112,6 +113,8 @@ class StatusQuestions:
             told += map(str, self.workers.faults(row["component"]))
             row["problem"] = "; ".join(filter(None, told))
             row["since"] = since.get(row["component"])
+            if limits := asked.get(row["component"]):
+                row["granted"] = limits.given()
             row["confinement"] = str(self.workers.launcher.level) if row["pid"] else None
         return own + [
             offered_row(offered, peer.name)

@@ -199,5 +199,6 @@ def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> An
             component.settings,
             component.devices,
             component.units,
+            component.limits,
         )
     )

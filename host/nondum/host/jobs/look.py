@@ -31,6 +31,7 @@ from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.build import verification
 from nondum.wheelhouse.format import confinement, contents
 from nondum.wheelhouse.format.contents import Contents
+from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.signatures import Grant, Verdict, Verifier
 from nondum.wheelhouse.payload import drive, host_facts, payload, preflight
@@ -198,6 +199,7 @@ def facts_of(arguments: Arguments) -> HostFacts:
         Path(arguments["store"]),
         reserve_mb=arguments["reserve_mb"],
         confinement=confinement.parse(arguments["confinement"]),
+        most=WorkerLimits(**arguments.get("most", {})),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,14 @@ class Prepared(InstalledComponent):
     @classmethod
     def parse(cls, said: Mapping[str, Any], name: str, scratch: Path) -> Prepared:
         """Read an `InstalledComponent`. It comes from our own child and is trusted."""
-        return from_plain(cls, {**said, "id": name, "scratch": str(scratch)}, said["id"])
+        # what is cached may be told by a version that knew no limits
+        told = {"limits": {}, **said, "id": name, "scratch": str(scratch)}
+        return from_plain(cls, told, said["id"])
 
     def spec(self, payload: str, limits: Limits) -> WorkerSpec:
-        """What its worker is started from."""
+        """What its worker is started from; `limits` hold where it asks for no others."""
+        changed = self.limits.given()
+        changed.pop("startup_s", None)  # no limit of a process, but of how long it is waited for
         return WorkerSpec(
             component=self.id,
             payload=payload,
@@ -40,7 +45,8 @@ class Prepared(InstalledComponent):
             index=self.description,
             settings=self.settings,
             permissions=self.permissions,
-            limits=limits,
+            limits=replace(limits, **changed),
+            asked=self.limits,
         )
 
     def record(self, payload: str) -> ComponentRecord:

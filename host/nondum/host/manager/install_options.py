@@ -9,6 +9,7 @@ from nondum.host.manager.drive_reading import LOOK_S
 from nondum.host.manager.payload_trust import TrustOptions
 from nondum.host.workers.spec import Limits
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.limits import WorkerLimits
 
 
 @frozen
@@ -27,5 +28,7 @@ class InstallOptions:
     forks_stay: Callable[[], bool] | None = None
     """Whether what children are forked from stays when none of them runs; None: always."""
     limits: Limits = field(default_factory=Limits)
-    """Of each worker."""
+    """Of each worker that asks for no others."""
+    most: WorkerLimits = field(default_factory=WorkerLimits)
+    """The most that a worker may ask for."""
     trust: TrustOptions = field(default_factory=TrustOptions)

@@ -390,6 +390,7 @@ class Installation:
             "reserve_mb": self._options.reserve_mb,
             "confinement": str(self._workers.launcher.level),
             "method": self._options.method,
+            "most": self._options.most.given(),
             **self._trust.arguments,
             **more,
         }

@@ -12,6 +12,7 @@ from nondum.host.sandbox.cgroups import CgroupLimits
 from nondum.planning.merge.contribution import object_name
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.limits import WorkerLimits
 
 
 @frozen
@@ -93,6 +94,8 @@ class WorkerSpec:
     settings: Mapping[str, Any] = field(default_factory=dict)
     permissions: tuple[str, ...] = ()
     limits: Limits = Limits()
+    asked: WorkerLimits = WorkerLimits()
+    """What its payload asked for and was granted; in `limits` already but for the start."""
 
     @property
     def package(self) -> str:

@@ -40,8 +40,9 @@ async def start_worker(
     """
     worker = await _launched(spec, launcher, timing, emit, on_crowded)
     on_launched(worker)
+    startup_s = spec.asked.startup_s or timing.startup_s
     try:
-        async with asyncio.timeout(timing.startup_s):
+        async with asyncio.timeout(startup_s):
             await worker.introduce(welcome)
     except BaseException as error:
         worker.end(Problem("WORKER_START_FAILED", "it did not start", where=spec.component))
@@ -50,7 +51,7 @@ async def start_worker(
             case LinkClosed():
                 raise WorkerFailed(problems.before_start(problem)) from None
             case TimeoutError():
-                raise WorkerFailed(problems.overdue(spec.component, timing.startup_s)) from None
+                raise WorkerFailed(problems.overdue(spec.component, startup_s)) from None
             case ProtocolViolation():
                 raise WorkerFailed(problems.foul(spec.component, error)) from error
             case WorkerFailed():

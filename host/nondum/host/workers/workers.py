@@ -33,6 +33,7 @@ from nondum.sdk import errors
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
 from nondum.transport import WorkerLink
+from nondum.wheelhouse.format.limits import WorkerLimits
 
 FactValue: TypeAlias = tuple[str, Sequence[str], Any]
 """Predicate, objects, and the value as it travels; None: it has none (any more)."""
@@ -306,6 +307,10 @@ class Workers:
     def since_wall_s(self) -> dict[str, float]:
         """When each running worker was launched, in seconds since 1970, by component."""
         return {worker.spec.component: worker.since_wall_s for worker in self._running()}
+
+    def asked(self) -> dict[str, WorkerLimits]:
+        """What each running worker's payload asked for and was granted, by component."""
+        return {worker.spec.component: worker.spec.asked for worker in self._running()}
 
     def pids_of(self, payload: str) -> tuple[int, ...]:
         """The processes of a payload's workers, as far as they are known."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from nondum.sdk.description import DeviceNeed
 from nondum.sdk.frozen import frozen
-from nondum.wheelhouse.format import confinement, names, tables
+from nondum.wheelhouse.format import confinement, limits, names, tables
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.device_rules import wrong_rules
+from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.tables import Form, Report, Table
 
 NAME = "payload.toml"
@@ -44,6 +45,7 @@ class Requires:
     """Version specifier (PEP 440); empty: any that the lock has wheels for."""
     disk_mb: int = 0
     memory_mb: int = 0
+    """Of all its components together: at least the sum of what each of them asks for."""
     gpu_memory_mb: int = 0
     confinement: Level = Level.NONE
     """The least level that its workers may run at."""
@@ -70,6 +72,8 @@ class ComponentManifest:
     units: tuple[UnitMount, ...] = ()
     permissions: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
+    limits: WorkerLimits = WorkerLimits()
+    """What it asks for instead of what a host gives each worker."""
 
 
 @frozen
@@ -95,6 +99,10 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
     Raises `PayloadRefused` with everything wrong in it.
     """
     root, report = tables.read(text, "MANIFEST", where)
+    requires = _requires(root.table("requires"))
+    components = tuple(
+        _component(table) for table in root.tables("component", required=not brings_goals)
+    )
     manifest = Manifest(
         id=root.text("id", _PAYLOAD_ID),
         name=root.text("name"),
@@ -102,10 +110,8 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
         authors=root.texts("authors"),
         licence=root.text("licence", default=""),
         homepage=root.text("homepage", default=""),
-        requires=_requires(root.table("requires")),
-        components=tuple(
-            _component(table) for table in root.tables("component", required=not brings_goals)
-        ),
+        requires=replace(requires, memory_mb=max(requires.memory_mb, _asked_mb(components))),
+        components=components,
         startup_hooks=root.texts("startup_hooks"),
     )
     root.close()
@@ -144,6 +150,7 @@ def _component(table: Table) -> ComponentManifest:
         units=tuple(_unit(unit) for unit in table.tables("unit")),
         permissions=table.texts("permissions"),
         settings=table.free("settings"),
+        limits=limits.parse(table.optional_table("limits")),
     )
     for permission in component.permissions:
         if permission not in PERMISSIONS:
@@ -151,6 +158,10 @@ def _component(table: Table) -> ComponentManifest:
             table.wrong("permissions", f"there is no permission {permission!r}", known)
     table.close()
     return component
+
+
+def _asked_mb(components: Iterable[ComponentManifest]) -> int:
+    return sum(component.limits.memory_mb or 0 for component in components)
 
 
 def _device(table: Table) -> DeviceNeed:

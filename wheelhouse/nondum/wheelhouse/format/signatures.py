@@ -13,6 +13,7 @@ from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.errors import Problem
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import goals as goal_file
+from nondum.wheelhouse.format.limits import WorkerLimits, not_granted
 from nondum.wheelhouse.format.manifest import GOALS, GRANTABLE, Manifest
 
 MAX_SIGNATURE_BYTES = 8 * 1024
@@ -30,6 +31,8 @@ class Grant:
     """The roles that may bring a payload of its id: whose was first, brings the next ones."""
     most_release: int | None = None
     """Newer releases are void, whatever came in before."""
+    most: WorkerLimits = WorkerLimits()
+    """The most that its workers may ask for."""
 
     def to_dict(self) -> dict[str, Any]:
         """The grant as plain data."""
@@ -41,12 +44,12 @@ class Grant:
         return from_plain(cls, said)
 
     def problems(self, manifest: Manifest, goals: Sequence[str] = ()) -> tuple[Problem, ...]:
-        """What a payload asks for and is not granted (PERMISSION_DENIED)."""
+        """What a payload asks for and is not granted (PERMISSION_DENIED, LIMIT_NOT_GRANTED)."""
         asked = [(c.id, permission) for c in manifest.components for permission in c.permissions]
         if goals:
             asked.append((goal_file.NAME, GOALS))
         by = f"the role {self.role}" if self.role else "its signer"
-        return tuple(
+        denied = tuple(
             Problem(
                 "PERMISSION_DENIED",
                 f"the payload asks for {permission!r}, which {by} may not give",
@@ -57,6 +60,12 @@ class Grant:
             )
             for where, permission in asked
             if permission not in self.permissions
+        )
+        fix = "ask for less, or raise {key} under `most` of that role in the trust file"
+        return denied + tuple(
+            problem
+            for component in manifest.components
+            for problem in not_granted(component.id, component.limits, self.most, by, fix)
         )
 
 

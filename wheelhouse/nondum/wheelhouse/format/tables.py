@@ -176,6 +176,13 @@ class Table:
         """The table under a key; empty when it is left out."""
         return Table(self._dict(key), self._report, self._full(key))
 
+    def optional_table(self, key: str) -> Table | None:
+        """The table under a key; None when it is left out: of several tables only some have it."""
+        if key in self._data:
+            return self.table(key)
+        self._taken.append(key)
+        return None
+
     def tables(self, key: str, *, required: bool = False) -> Sequence[Table]:
         """An array of tables."""
         value = self._take(key, None if required else [])

@@ -14,6 +14,7 @@ from packaging.tags import Tag
 
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.target import Target
 from nondum.wheelhouse.payload import memory
 from nondum.wheelhouse.payload.gpu import Gpu
@@ -21,6 +22,7 @@ from nondum.wheelhouse.payload.memory import Memory
 from nondum.wheelhouse.store import disk
 
 _PLENTY_MB = 2**40
+_NO_BOUND = WorkerLimits()
 
 
 @frozen
@@ -44,9 +46,13 @@ class HostFacts:
     """Version of nondum."""
     reserve_mb: int = 0
     """Disk that is left free, whatever comes: `install.reserve_mb`."""
+    most: WorkerLimits = WorkerLimits()
+    """The most that a worker may ask for: `most_…` under `[workers]`."""
 
 
-def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
+def probe(
+    state: Path, *, reserve_mb: int, confinement: Level, most: WorkerLimits = _NO_BOUND
+) -> HostFacts:
     """Look at this machine. `state` is where the store is, or will be."""
     return HostFacts(
         architecture=platform.machine(),
@@ -58,6 +64,7 @@ def probe(state: Path, *, reserve_mb: int, confinement: Level) -> HostFacts:
         confinement=confinement,
         nondum=nondum_version(),
         reserve_mb=reserve_mb,
+        most=most,
     )
 
 

@@ -15,6 +15,7 @@ from packaging.version import Version
 
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.wheelhouse.format import lock as locks_module
+from nondum.wheelhouse.format.limits import not_granted
 from nondum.wheelhouse.format.lock import Lock, LockedWheel
 from nondum.wheelhouse.format.manifest import Manifest
 from nondum.wheelhouse.payload import memory
@@ -57,6 +58,7 @@ def preflight(
     problems = [
         *_version_problems(manifest, facts, minimum_nondum),
         *memory.problems(manifest.requires, facts.memory, manifest.id),
+        *_limit_problems(manifest, facts),
     ]
     for component in manifest.components:
         if component.id not in locks:
@@ -200,6 +202,12 @@ def _version_problems(
             have=f"level {facts.confinement}",
             fix="see `nondum doctor` for what confinement lacks on this host, or use another host",
         )
+
+
+def _limit_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
+    fix = "use another host, or raise `most_{key}` under `[workers]` in its configuration"
+    for component in manifest.components:
+        yield from not_granted(component.id, component.limits, facts.most, "this host", fix)
 
 
 def _disk_problems(

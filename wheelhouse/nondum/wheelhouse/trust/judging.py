@@ -259,4 +259,5 @@ def _grant(trust: Trust, owners: Sequence[Role], role: Role, listed: Contents) -
         role=role.name,
         owners=tuple(owner.name for owner in owners),
         most_release=trust.bound(listed.payload_id).most,
+        most=role.most,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.trust.public_key import PublicKey
 
 ANY = "*"
@@ -45,6 +46,9 @@ class Role:
     """How many of them must have signed a payload."""
     permissions: tuple[str, ...] = ()
     """What its payloads may ask for; `*`: anything."""
+    most: WorkerLimits = WorkerLimits()
+    """The most that each of their workers may ask for; a limit that is left out has no bound here.
+    """
 
     def covers(self, payload_id: str) -> int:
         """How closely the role names an id: the length of what it names; -1: not at all.

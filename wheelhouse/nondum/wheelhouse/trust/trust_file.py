@@ -37,7 +37,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from nondum.sdk.errors import PayloadRefused, Problem, TrustRefused
-from nondum.wheelhouse.format import names, tables
+from nondum.wheelhouse.format import limits, names, tables
 from nondum.wheelhouse.format.manifest import GRANTABLE
 from nondum.wheelhouse.format.tables import Form, Table
 from nondum.wheelhouse.trust.public_key import FINGERPRINT, PublicKey, parse_line
@@ -151,6 +151,7 @@ def _role(table: Table) -> Role:
             lambda one: one == ANY or one in GRANTABLE,
             f"one of {', '.join(GRANTABLE)} and {ANY!r}",
         ),
+        most=limits.parse(table.optional_table("most")),
     )
     if not role.payloads:
         table.wrong("payloads", "is missing or empty", f'payloads = ["org.example"], or ["{ANY}"]')

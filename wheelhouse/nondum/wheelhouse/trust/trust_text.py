@@ -35,6 +35,8 @@ def _lines(trust: Trust) -> Iterator[str]:
         if role.threshold != 1:
             yield f"threshold = {role.threshold}"
         yield f"permissions = {_texts(role.permissions)}"
+        if most := role.most.given():
+            yield f"most = {{ {', '.join(f'{key} = {bound}' for key, bound in most.items())} }}"
     for bounds in trust.bounds:
         yield from ("", "[[release]]", f"payload = {_text(bounds.payload)}")
         yield f"least = {bounds.least}"

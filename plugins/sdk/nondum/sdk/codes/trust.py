@@ -30,6 +30,12 @@ CODES = (
         "give a line or a file like those that `nondum keys new` and `nondum peers key` make",
     ),
     Code(
+        "LIMIT_NOT_GRANTED",
+        "A component asks for more memory, threads or time than its signer or this host may give.",
+        "ask for less in payload.toml, or raise the bound: `most` of the role in the trust file, "
+        "`most_…` under [workers] of the host",
+    ),
+    Code(
         "PERMISSION_DENIED",
         "The payload asks for more permissions than its signer may give.",
         "leave the permission out of payload.toml, or add it to that role in the trust file",
