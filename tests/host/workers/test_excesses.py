@@ -116,6 +116,44 @@ async def test_too_much_ends_that_worker_alone(
         assert os.listdir(in_cgroup.folder / "guest/scratch") == []  # noqa: PTH208
 
 
+MEMFD = (
+    "held = os.memfd_create('held')\n"
+    "for _ in range(400):\n    os.write(held, bytes(1 << 20))\n    await asyncio.sleep(0)\n"
+    "await asyncio.sleep(60)"
+)
+SHARED = (
+    "import mmap\nheld = []\nfor _ in range(400):\n    held.append(mmap.mmap(-1, 1 << 20))\n"
+    "    held[-1].write(bytes(1 << 20))\n    await asyncio.sleep(0)\nawait asyncio.sleep(60)"
+)
+HALF = "b = bytearray(70 << 20); import time; time.sleep(60)"
+CHILDREN = (
+    f"for _ in range(2): subprocess.Popen([sys.executable, '-c', {HALF!r}])\n"
+    "await asyncio.sleep(60)"
+)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        pytest.param(MEMFD, id="file in memory"),
+        pytest.param(SHARED, id="shared memory"),
+        pytest.param(CHILDREN, id="children that are within the limit each"),
+    ],
+)
+async def test_without_control_groups_memory_is_looked_at(
+    tmp_path: Path, clock: VirtualClock, body: str
+) -> None:
+    tested = WorkersUnderTest(tmp_path, WATCHED)
+    await begin(tested, "other", "pass")
+    await begin(tested, "guest", body)
+    call = do(tested)
+    exited = await clock.advance_until(tested.until(WorkerExited))
+    assert (exited.component, exited.reason.partition(" ")[0]) == ("guest", "WORKER_OOM")
+    assert await call.ended() is RunState.FAILED
+    assert await done(tested, "other") is RunState.SUCCEEDED
+    await tested.close(clock)
+
+
 async def test_what_cannot_be_deleted_is_told_and_holds_nothing_up(
     in_cgroup: WorkersUnderTest, clock: VirtualClock
 ) -> None:

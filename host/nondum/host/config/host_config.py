@@ -111,8 +111,8 @@ class WorkersSection:
     that is set here and that its signer's role may give."""
 
     memory_mb: int = 2048
-    """Memory of all its processes, where the machine has the memory cgroup; else the data of each.
-    """
+    """Memory of all its processes, where the machine has the memory cgroup; else the data of each,
+    and what all of them hold whenever that is looked at."""
     tasks: int = 256
     """Processes and threads."""
     descriptors: int = 1024

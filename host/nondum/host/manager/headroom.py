@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any
 
+from nondum.host.workers.held_memory import private_bytes
 from nondum.sdk.codec.values import from_plain
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.payload.memory import Memory
 
 RESERVE_MB = 64
 """Memory that is left free while two releases run."""
-_PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 
 
 @frozen
@@ -55,27 +53,5 @@ def _too_little(what: str, needed_mb: int, left_mb: int) -> str:
 
 
 def used_mb(pids: Collection[int]) -> int:
-    """Memory that processes have for themselves alone: what is free once they are gone.
-
-    Blocks for some milliseconds (proc_pid_smaps(5)).
-    """
-    return sum(map(_private_kb, pids)) // 1024
-
-
-def _private_kb(pid: int) -> int:
-    try:
-        lines = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines()
-    except PermissionError:  # another user's
-        return _resident_kb(pid)
-    except OSError:  # it has just ended
-        return 0
-    return sum(int(line.split()[1]) for line in lines if line.startswith("Private_"))
-
-
-def _resident_kb(pid: int) -> int:
-    """What all may know: pages in memory that are no file's (proc_pid_statm(5))."""
-    try:
-        resident, shared = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1:3]
-    except OSError:
-        return 0
-    return (int(resident) - int(shared)) * _PAGE_KB
+    """Memory that processes have for themselves alone: what is free once they are gone. Blocks."""
+    return private_bytes(pids) // 2**20

@@ -37,6 +37,8 @@ class Reading:
     scratch_bytes: int = 0
     wanted_s: Mapping[int, float] = field(default_factory=dict)
     """Thread → seconds that it has run or waited for a processor since it began."""
+    held_bytes: int = 0
+    """Memory that its processes hold, where no control group bounds that; else 0."""
     is_asked: bool = False
     """Whether a behaviour of its runs or a stream of its flows."""
 
@@ -78,7 +80,8 @@ class Watch:
         return Excess(fresh)
 
     def _end(self, last: Reading, now: Reading) -> Problem | None:
-        if now.usage.oom_kills > last.usage.oom_kills:
+        is_beyond = now.held_bytes > self.limits.memory_mb * problems.MEGABYTE
+        if is_beyond or now.usage.oom_kills > last.usage.oom_kills:
             return problems.out_of_memory(self.component, self.limits.memory_mb)
         if now.usage.refused_tasks == last.usage.refused_tasks:
             self._refused_before = now.usage.refused_tasks

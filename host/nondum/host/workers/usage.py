@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nondum.host.sandbox.cgroups import Cgroup, Usage
 from nondum.host.sandbox.inside import open_files
-from nondum.host.workers import scratch
+from nondum.host.workers import held_memory, scratch
 from nondum.host.workers.init_link import OpenFiles
 from nondum.host.workers.limits import Reading
 
@@ -39,6 +39,13 @@ class UsageReader:
             return self._cgroup.usage()
         return Usage(cpu_s=_cpu_s(self._first()))
 
+    def held_bytes(self) -> int:
+        """Memory that its processes hold: its descendants too, without a cgroup."""
+        is_whole = self.is_whole
+        return held_memory.held_bytes(
+            self.pids() if is_whole else held_memory.family(self._first())
+        )
+
     def wanted_s(self) -> dict[int, float]:
         """Thread → seconds that it has run or waited for a processor (sched-stats.rst)."""
         return {task: wanted_s for pid in self.pids() for task, wanted_s in _wanted_s(pid)}
@@ -60,9 +67,11 @@ class UsageReader:
         else:
             descriptors = told.descriptors
             used = scratch.used_bytes(folder) + told.deleted_bytes
+        usage = self.usage()
         return Reading(
             at_s=now_s(),
-            usage=self.usage(),
+            usage=usage,
+            held_bytes=0 if usage.memory_bytes else self.held_bytes(),
             descriptors=descriptors,
             wanted_s=self.wanted_s(),
             scratch_bytes=used,
