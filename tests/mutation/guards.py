@@ -163,6 +163,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/workers/news.py": (f"{_TH}/workers/test_news.py", f"{_TH}/control/test_news.py"),
     f"{_H}/workers/limits.py": (
         f"{_TH}/workers/test_excesses.py::test_too_much_ends_that_worker_alone",
+        f"{_TH}/workers/test_excesses.py::test_without_control_groups_memory_is_looked_at",
     ),
     # How they are confined.
     f"{_H}/workers/confinement_choice.py": ("tests/sandbox/test_level.py",),
