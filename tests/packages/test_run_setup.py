@@ -62,10 +62,34 @@ def checkout(tmp_path: Path) -> Checkout:
     (installer / "requirements.lock").touch()
     (installer / "__main__.py").write_text(INSTALLER)
     (tmp_path / "bin").mkdir()
-    (tmp_path / "bin/python3").write_text(PYTHON)
-    (tmp_path / "bin/python3").chmod(0o755)
+    make(tmp_path / "bin/python3", PYTHON)
     (tmp_path / "bin/apt-get").symlink_to("/bin/false")  # what this machine lacks, it lacks
     return Checkout(tmp_path)
+
+
+OLD = """#!/bin/sh
+[ "$1" != -V ] || echo "Python 3.10.12"
+[ "$1" = -V ]
+"""
+
+
+def make(program: Path, text: str) -> None:
+    program.write_text(text)
+    program.chmod(0o755)
+
+
+def test_newer_python_is_taken_where_the_systems_is_too_old(checkout: Checkout) -> None:
+    make(checkout.folder / "bin/python3", OLD)
+    make(checkout.folder / "bin/python3.13", OLD)
+    make(checkout.folder / "bin/python3.12", PYTHON)
+    assert checkout.set_up() == (0, ["host", "dev"])
+
+
+def test_without_a_newer_python_nothing_is_made(checkout: Checkout) -> None:
+    for name in ("python3", "python3.13", "python3.12", "python3.11"):
+        make(checkout.folder / "bin" / name, OLD)
+    assert checkout.set_up() == (1, [])
+    assert not (checkout.folder / ".venv").exists()
 
 
 def test_set_up_looks_again_at_what_is_there(checkout: Checkout) -> None:
