@@ -37,7 +37,7 @@ async def reading_of(*answers: Sequence[bytes]) -> AsyncIterator[Reading]:
         yield reading
     finally:
         reading.incoming.close()
-        lying.socket.close()
+        lying.close()
         context.term()
 
 
