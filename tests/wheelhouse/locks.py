@@ -62,6 +62,10 @@ FACTS = HostFacts(
 )
 
 
+def unpacks_to(size: int, filename: str = "dist_a-1.0-py3-none-any.whl") -> str:
+    return f'[packages.tool.nondum.unpacked]\n"{filename}" = {size}\n'
+
+
 def locked(component: str, tag: str = "py3-none-any", more: str = "", size: int = 3) -> Lock:
     one = wheel(f"dist_{component}-1.0-{tag}.whl").replace("size = 3", f"size = {size}")
     text = HEAD + package(f"dist-{component}", "1.0", one, more=more)

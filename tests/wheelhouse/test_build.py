@@ -30,6 +30,7 @@ from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.signatures import UnsignedAllowed
 from nondum.wheelhouse.format.target import Target, targets
 from nondum.wheelhouse.payload import drive, host_facts, payload
+from nondum.wheelhouse.store.store import Store
 
 HERE = Target.here()
 OTHER = Target("aarch64" if HERE.architecture != "aarch64" else "x86_64", HERE.python)
@@ -96,6 +97,15 @@ def test_the_lock_names_every_wheel_on_the_drive(built: Build, tmp_path: Path) -
     parsed = lock.parse((folder / "pylock.blinker.toml").read_text(), "lock")
     assert parsed.packages == {"blinker", "msgpack", "nondum-sdk", "pluggy"}
     assert {w.filename for w in parsed.wheels} == {p.name for p in (folder / "wheels").iterdir()}
+
+
+def test_the_lock_says_what_is_installed_from_each_wheel(built: Build, tmp_path: Path) -> None:
+    folder = built(make_source(tmp_path / "src"))
+    parsed = lock.parse((folder / "pylock.blinker.toml").read_text(), "lock")
+    store = Store(tmp_path / "store")
+    stored = [store.add(folder / w.path, w.sha256) for w in parsed.wheels]
+    assert [w.unpacked for w in parsed.wheels] == [s.size for s in stored]
+    assert all(w.unpacked > 0 for w in parsed.wheels)
 
 
 def test_each_architecture_and_python_gets_its_wheels(

@@ -221,8 +221,30 @@ REFUSED = {
         "LOCK_INVALID",
         PLAIN.replace("[[", f"environments = [\"python_version > '{DIGITS}'\"]\n[[", 1),
     ),
+    "unpacked-is-a-number": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more="tool.nondum.unpacked = 3\n"),
+    ),
+    "unpacked-size-is-text": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more=f'tool.nondum.unpacked = {{ "{A}" = "3" }}\n'),
+    ),
+    "unpacked-size-below-nothing": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more=f'tool.nondum.unpacked = {{ "{A}" = -1 }}\n'),
+    ),
+    "nondum-says-a-number": (
+        "LOCK_INVALID",
+        HEAD + package("a", "1.0", wheel(A), more="tool.nondum = 3\n"),
+    ),
     "no-package-version": ("LOCK_INVALID", PLAIN.replace('version = "1.0"\n[[', "[[")),
 }
+
+
+def test_what_other_tools_say_of_a_package_is_passed_over() -> None:
+    more = "tool.uv.unpacked = 3\ntool.nondum.later = 3\n"
+    (read,) = lock.parse(HEAD + package("a", "1.0", wheel(A), more=more), "pylock.a.toml").wheels
+    assert (read.size, read.unpacked) == (3, 3)
 
 
 @pytest.mark.parametrize(("code", "text"), REFUSED.values(), ids=REFUSED)

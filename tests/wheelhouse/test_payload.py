@@ -170,9 +170,9 @@ def test_wheels_that_unpack_to_more_than_the_free_space_are_refused(
     roomy = WheelBuilder(files={"evil/__init__.py": b"", "evil/zeros": bytes(8 * 1024**2)})
     part = Part("blinker", "X = 1\n", with_sdk=False, wheels=[roomy.write(tmp_path / "w")])
     payload = staged(make_payload(tmp_path / "drive", part), tmp_path)
-    (problem,) = check_wheels(payload, replace(facts, free_disk_mb=7))
-    assert (problem.code, problem.need, problem.have) == ("DISK_FULL", "8 MB", "7 MB")
-    assert check_wheels(payload, replace(facts, free_disk_mb=8)) == ()
+    (problem,) = check_wheels(payload, replace(facts, free_disk_mb=8))
+    assert (problem.code, problem.need, problem.have) == ("DISK_FULL", "9 MB", "8 MB")
+    assert check_wheels(payload, replace(facts, free_disk_mb=9)) == ()
 
 
 def test_preflight_is_part_of_checking(tmp_path: Path, facts: HostFacts) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.wheelhouse.locks import FACTS, locked
+from tests.wheelhouse.locks import FACTS, SHA, locked, unpacks_to
 
 from nondum.sdk.errors import PayloadRefused
 from nondum.wheelhouse.format import manifest
@@ -64,13 +64,32 @@ def test_what_does_not_fit_is_told(code: str, requires: str, need: str, have: st
     assert problem.where == "org.example.x"
 
 
-def test_wheels_need_free_space_to_unpack() -> None:
-    big = locked("a", size=400 * 1024**2)
-    assert codes(said(), {"a": big}) == ["DISK_FULL"]
+@pytest.mark.parametrize(
+    ("size_mb", "unpacked_mb", "refused"),
+    [
+        pytest.param(400, 600, [], id="both fit"),
+        pytest.param(400, 601, ["DISK_FULL"], id="a megabyte too much"),
+        pytest.param(999, 1, [], id="stored as it is, and nothing of it installed"),
+        pytest.param(1, 999, [], id="well packed"),
+        pytest.param(500, None, [], id="nothing said: as much again"),
+        pytest.param(501, None, ["DISK_FULL"], id="nothing said: more than as much again"),
+    ],
+)
+def test_wheels_need_disk_for_themselves_and_for_what_their_lock_says_they_unpack_to(
+    size_mb: int, unpacked_mb: int | None, refused: list[str]
+) -> None:
+    more = "" if unpacked_mb is None else unpacks_to(unpacked_mb * 1024**2)
+    assert codes(said(), {"a": locked("a", more=more, size=size_mb * 1024**2)}) == refused
+
+
+def test_wheels_that_are_stored_already_need_no_disk() -> None:
+    big = {"a": locked("a", size=600 * 1024**2)}
+    assert [p.code for p in preflight(said(), big, FACTS)] == ["DISK_FULL"]
+    assert preflight(said(), big, FACTS, stored={SHA}) == ()
 
 
 def test_wheels_that_components_share_are_counted_once() -> None:
-    one = locked("a", size=200 * 1024**2)
+    one = locked("a", size=400 * 1024**2)
     shared = replace(one, where="pylock.b.toml")
     both = replace(
         said(components=("a", "b")),

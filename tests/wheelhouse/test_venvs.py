@@ -200,7 +200,8 @@ def test_adding_to_no_venv_is_told(store: Store, tmp_path: Path) -> None:
 
 def locked(path: Path) -> LockedWheel:
     name, version = path.name.split("-")[:2]
-    return LockedWheel(name, version, f"wheels/{path.name}", sha256(path), path.stat().st_size)
+    size = path.stat().st_size
+    return LockedWheel(name, version, f"wheels/{path.name}", sha256(path), size, unpacked=size)
 
 
 @pytest.fixture
@@ -224,7 +225,7 @@ from pathlib import Path
 from nondum.wheelhouse.store import venvs
 from nondum.wheelhouse.format.lock import LockedWheel
 venv, python, folder = map(Path, sys.argv[1:])
-wheel = LockedWheel("one", "1", "wheels/one-1-py3-none-any.whl", "0" * 64, 1)
+wheel = LockedWheel("one", "1", "wheels/one-1-py3-none-any.whl", "0" * 64, 1, 1)
 venvs.make_with_pip(venv, python, folder, [wheel])
 """
 

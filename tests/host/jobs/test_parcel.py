@@ -15,6 +15,7 @@ from tests.kit.payloads import seal
 from nondum.host.jobs import parcel
 from nondum.wheelhouse.payload import payload
 from nondum.wheelhouse.payload.memory import Promised
+from nondum.wheelhouse.store.store import Store
 
 
 def hand_over(folder: Path, target: Path, **more: Any) -> dict[str, Any]:
@@ -160,3 +161,26 @@ def test_fetched_files_need_disk_space_beside_what_is_made_of_them(
             assert code(judge, folder, tmp_path) == refusal
         else:
             assert judge(folder, tmp_path)["needed"]
+
+
+@pytest.mark.parametrize(("method", "refused"), [("store", False), ("pip", True)])
+def test_wheels_that_are_stored_take_no_disk_but_with_pip(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str, *, refused: bool
+) -> None:
+    folder = lamp(tmp_path / "drive")
+    (wheel,) = (folder / "wheels").glob("test_lamp*")
+    lock = folder / "pylock.lamp.toml"
+    said = f'[packages.tool.nondum.unpacked]\n"{wheel.name}" = {200 * 2**20}\n'
+    before, after = lock.read_text().split(f'[[packages.wheels]]\nname = "{wheel.name}"')
+    lock.write_text(f'{before}{said}[[packages.wheels]]\nname = "{wheel.name}"{after}')
+    seal(folder, payload_id=PAYLOAD)
+    real = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: real._replace(free=100 * 2**20))
+    assert code(judge, folder, tmp_path, method=method) == "DISK_FULL"
+    store = Store(tmp_path / "store")
+    for path in (folder / "wheels").iterdir():
+        store.add(path, hashlib.sha256(path.read_bytes()).hexdigest())
+    if refused:
+        assert code(judge, folder, tmp_path, method=method) == "DISK_FULL"
+    else:
+        assert judge(folder, tmp_path, method=method)["needed"] == []

@@ -165,8 +165,22 @@ def admitted(arguments: Arguments, judged: Judged, staged: StagedPayload) -> Hos
     facts = facts_of(arguments)
     facts = replace(facts, memory=memory_for(arguments, facts))
     minimum = judged.listed.minimum_nondum
-    refuse_if_any(preflight.preflight(staged.manifest, staged.locks, facts, minimum_nondum=minimum))
+    refuse_if_any(preflight_problems(arguments, staged, facts, minimum_nondum=minimum))
     return facts
+
+
+def preflight_problems(
+    arguments: Arguments, staged: StagedPayload, facts: HostFacts, *, minimum_nondum: str = "0"
+) -> tuple[Problem, ...]:
+    """What keeps a payload from running here, with what this host's store has of it already."""
+    stored: set[str] = set()
+    if arguments["method"] != "pip":
+        store = Store(Path(arguments["store"]))
+        wheels = {wheel.sha256 for lock in staged.locks.values() for wheel in lock.wheels}
+        stored = {sha256 for sha256 in wheels if store.has(sha256)}
+    return preflight.preflight(
+        staged.manifest, staged.locks, facts, minimum_nondum=minimum_nondum, stored=stored
+    )
 
 
 def verify(arguments: Arguments, report: Report) -> dict[str, Any]:

@@ -80,19 +80,14 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     chain.grant_of_kept({**arguments, "demand_trust": True}, folder, staged.manifest)
     facts = look.facts_of(arguments)
     facts = replace(facts, memory=look.memory_for(arguments, facts))
-    problems = preflight.preflight(
-        staged.manifest, staged.locks, facts, minimum_nondum=listed.minimum_nondum
-    )
-    if problems:
-        raise PayloadRefused(*problems)
+    minimum = listed.minimum_nondum
+    look.refuse_if_any(look.preflight_problems(arguments, staged, facts, minimum_nondum=minimum))
     known = look.known_wheels(arguments, staged, facts)
     missing = {w.path for w in look.chosen(staged, facts) if w.sha256 not in known}
     needed = [entry for entry in listed.entries if entry.path in missing]
     fetched_mb = sum(entry.size for entry in needed) // _MB
     beside = replace(facts, free_disk_mb=max(0, facts.free_disk_mb - fetched_mb))
-    problems = preflight.preflight(staged.manifest, staged.locks, beside)
-    if problems:
-        raise PayloadRefused(*problems)
+    look.refuse_if_any(look.preflight_problems(arguments, staged, beside))
     return {"needed": [_row(entry) for entry in needed]}
 
 

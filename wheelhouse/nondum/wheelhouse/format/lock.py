@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from packaging.markers import EvaluateContext, Marker, UndefinedEnvironmentName
 from packaging.pylock import Package, Pylock, PylockSelectError, PylockValidationError
@@ -20,10 +20,13 @@ from packaging.utils import InvalidWheelFilename, canonicalize_name, parse_wheel
 from nondum.sdk.errors import PayloadRefused, Problem
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import names
+from nondum.wheelhouse.format.contents import MAX_FILE_BYTES
 
 MAX_BYTES = 1024 * 1024
 MAX_DIGITS = 250
 """Digits in a row. Python makes no number of more than 4,300 (`int`), wherever one is compared."""
+TOOL, UNPACKED = "nondum", "unpacked"
+"""Where a package's table says how many bytes are installed from each of its wheels."""
 
 _ENDLESS = re.compile(f"[0-9]{{{MAX_DIGITS + 1}}}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
@@ -43,6 +46,9 @@ class LockedWheel:
     """Relative to the payload folder."""
     sha256: str
     size: int
+    unpacked: int
+    """Bytes of the files that are installed from it, as the lock says; its own size where no lock
+    does."""
 
     @property
     def filename(self) -> str:
@@ -151,6 +157,8 @@ def flaws(package: Package, where: str) -> Iterator[Problem]:
         yield _flaw("LOCK_NOT_WHEEL", f"{name} has no wheel", where)
     if package.version is None:
         yield _flaw("LOCK_INVALID", f"{name} has no version", where)
+    if (flaw := _unpacked_flaw(package)) is not None:
+        yield _flaw("LOCK_INVALID", f"{name}: {flaw}", where)
     for wheel in package.wheels or ():
         place = f"{where} {name}"
         if wheel.url is not None:
@@ -180,8 +188,25 @@ def _wheel_flaws(path: str, package: Package, place: str) -> Iterator[Problem]:
         yield _flaw("LOCK_INVALID", f"{path} is not {package.name} {package.version}", place)
 
 
+def _unpacked(package: Package) -> Any:
+    """What the lock says of its wheels' unpacked sizes, in the table that tools have to themselves
+    (PEP 751, `packages.tool`)."""
+    table = (package.tool or {}).get(TOOL, {})
+    return table.get(UNPACKED, {}) if isinstance(table, dict) else table
+
+
+def _unpacked_flaw(package: Package) -> str | None:
+    said = _unpacked(package)
+    if not isinstance(said, dict) or not all(type(size) is int for size in said.values()):
+        return f"{UNPACKED!r} of the tool {TOOL!r} must say how many bytes each wheel unpacks to"
+    if any(not 0 <= size <= MAX_FILE_BYTES for size in said.values()):
+        return f"a wheel that unpacks to other than 0 to {MAX_FILE_BYTES} bytes"
+    return None
+
+
 def _wheels(parsed: Pylock) -> Iterator[LockedWheel]:
     for package in parsed.packages:
+        unpacked = _unpacked(package)
         for wheel in package.wheels or ():
             yield LockedWheel(
                 name=str(package.name),
@@ -189,6 +214,7 @@ def _wheels(parsed: Pylock) -> Iterator[LockedWheel]:
                 path=str(wheel.path),
                 sha256=wheel.hashes["sha256"],
                 size=int(wheel.size or 0),
+                unpacked=unpacked.get(PurePosixPath(wheel.path or "").name, int(wheel.size or 0)),
             )
 
 

@@ -5,7 +5,7 @@ Every problem is told at once, with what is needed and what is there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from packaging.markers import UndefinedComparison, UndefinedEnvironmentName
 from packaging.requirements import Requirement
@@ -23,8 +23,6 @@ from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.wheels import wheel
 from nondum.wheelhouse.wheels.wheel import Layout
 
-GROWTH = 4
-"""Unpacked wheels have at most about this multiple of their size; measured: 2.8 to 2.9."""
 _MB = 1024 * 1024
 
 
@@ -49,11 +47,17 @@ def select(
 
 
 def preflight(
-    manifest: Manifest, locks: Mapping[str, Lock], facts: HostFacts, *, minimum_nondum: str = "0"
+    manifest: Manifest,
+    locks: Mapping[str, Lock],
+    facts: HostFacts,
+    *,
+    minimum_nondum: str = "0",
+    stored: Collection[str] = (),
 ) -> tuple[Problem, ...]:
     """Everything that keeps this payload from running here.
 
-    `minimum_nondum` is what the contents list asks for.
+    `minimum_nondum` is what the contents list asks for; `stored` are the hashes of wheels that this
+    host has already, which take no more of its disk.
     """
     problems = [
         *_version_problems(manifest, facts, minimum_nondum),
@@ -70,7 +74,7 @@ def preflight(
     except PayloadRefused as error:
         return (*problems, *error.problems)
     problems.extend(_unlocked(manifest, locks, chosen))
-    return (*problems, *_disk_problems(manifest, chosen, facts))
+    return (*problems, *_disk_problems(manifest, chosen, facts, stored))
 
 
 def _unlocked(
@@ -145,7 +149,7 @@ def misfits(
 
 def unpacked_problems(layouts: Iterable[Layout], facts: HostFacts, where: str) -> Iterator[Problem]:
     """When wheels are too much for the disk, by the sizes of all their files."""
-    needed = sum(file.member.size for layout in layouts for file in layout.files) // _MB
+    needed = _whole_mb(sum(layout.size for layout in layouts))
     if needed > facts.free_disk_mb:
         yield _short(needed, facts, where)
 
@@ -211,12 +215,21 @@ def _limit_problems(manifest: Manifest, facts: HostFacts) -> Iterator[Problem]:
 
 
 def _disk_problems(
-    manifest: Manifest, chosen: Mapping[str, Sequence[LockedWheel]], facts: HostFacts
+    manifest: Manifest,
+    chosen: Mapping[str, Sequence[LockedWheel]],
+    facts: HostFacts,
+    stored: Collection[str],
 ) -> Iterator[Problem]:
-    wheels = {wheel.sha256: wheel.size for group in chosen.values() for wheel in group}
-    needed = max(manifest.requires.disk_mb, GROWTH * sum(wheels.values()) // _MB)
+    """What is copied stays until all of it is unpacked, so both are on the disk then."""
+    wheels = {w.sha256: w for group in chosen.values() for w in group if w.sha256 not in stored}
+    size = sum(wheel.size + wheel.unpacked for wheel in wheels.values())
+    needed = max(manifest.requires.disk_mb, _whole_mb(size))
     if needed > facts.free_disk_mb:
         yield _short(needed, facts, manifest.id)
+
+
+def _whole_mb(size: int) -> int:
+    return -(-size // _MB)
 
 
 def free_beside(free_mb: int, reserve_mb: int) -> str:

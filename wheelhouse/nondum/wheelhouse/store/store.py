@@ -77,6 +77,10 @@ class Store:
             raise
         return tuple(stored[sha256] for _, sha256 in wheels)
 
+    def has(self, sha256: str) -> bool:
+        """Whether a wheel of this hash is stored, without reading anything of it."""
+        return (self.root / sha256).is_dir()
+
     def get(self, sha256: str) -> StoredWheel | None:
         """A stored wheel by hash, without looking at its files."""
         return read_entry(self.root / sha256)

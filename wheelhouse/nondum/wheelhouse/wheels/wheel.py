@@ -61,6 +61,11 @@ class Layout:
     needs: Needs = field(default_factory=Needs)
     """What its metadata asks for."""
 
+    @property
+    def size(self) -> int:
+        """Bytes of all files that are installed."""
+        return sum(file.size for file in self.files)
+
 
 def opened(path: Path) -> FixedFile:
     """A wheel's bytes; close it. Only for files that no one else can change. Raises `OSError`."""
