@@ -20,7 +20,7 @@ from tests.kit.clock import VirtualClock
 from tests.kit.processes import process_ended
 from tests.kit.until import until_async
 
-from nondum.host.forking.fork_client import REST_S
+from nondum.host.forking.fork_client import REST_S, Forked
 from nondum.host.jobs import allowance
 from nondum.host.jobs.children import (
     AHEAD_S,
@@ -292,6 +292,29 @@ async def test_none_is_forked_ahead_while_another_works(
         assert not working.done()
         working.cancel()
         await asyncio.wait([working])
+
+
+async def test_none_is_forked_ahead_while_another_is_being_forked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clock: VirtualClock
+) -> None:
+    async with children() as pool:
+        await pool.run("look", drive(tmp_path))
+        assert pool.server is not None
+        asked, fork = [], pool.forks.fork
+
+        async def noted(message: str, patience_s: float) -> Forked:
+            asked.append(message)
+            return await fork(message, patience_s)
+
+        monkeypatch.setattr(pool.forks, "fork", noted)
+        os.kill(pool.server, signal.SIGSTOP)
+        try:
+            coming = asyncio.create_task(pool.run("look", drive(tmp_path)))
+            await clock.advance(2 * AHEAD_S)
+        finally:
+            os.kill(pool.server, signal.SIGCONT)
+        assert await coming == NOTHING
+        assert asked == ["look"]
 
 
 @pytest.mark.parametrize("aside", [False, True])

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import logging
 import os
+import select
 import signal
 import socket
 import sys
@@ -62,8 +63,8 @@ class Forked:
 
     @property
     def is_over(self) -> bool:
-        """Whether it runs no more."""
-        return self._over.is_set()
+        """Whether it runs no more, also where the loop has not come to see it yet."""
+        return self._over.is_set() or (self._status >= 0 and _is_readable(self._descriptor))
 
     async def over(self) -> None:
         """Wait until it runs no more. The server may be too busy to tell the return code as yet."""
@@ -300,6 +301,13 @@ def _closed(descriptor: int) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _is_readable(pidfd: int) -> bool:
+    """Whether its process has ended (pidfd_open(2))."""
+    poll = select.poll()
+    poll.register(pidfd, select.POLLIN)
+    return bool(poll.poll(0))
 
 
 def _kill(pidfd: int) -> None:

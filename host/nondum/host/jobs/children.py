@@ -115,6 +115,8 @@ class Children:
         self._ahead: _Child | None = None
         """Has read nothing, and works for the next owner."""
         self._busy: set[_Child] = set()
+        self._jobs = 0
+        """Those that were begun and have not ended; the child of some is still to be forked."""
         self._left_behind: set[_Child] = set()
         """Those that were killed and have not ended yet: a disk may hold one for ever."""
         self._resting: asyncio.Task[None] | None = None
@@ -136,15 +138,14 @@ class Children:
         started, CHILD_LIMIT when it used up its processor time, CHILD_DIED when it ended without an
         answer otherwise.
         """
-        child = await self._take(owner, job)
-        self._busy.add(child)
-        try:
-            answer = await child.do(job, arguments, stall_s, on_progress)
-        except BaseException:
-            await self._end(child)
-            raise
-        finally:
-            self._tend()
+        with self._counted():
+            child = await self._take(owner, job)
+            self._busy.add(child)
+            try:
+                answer = await child.do(job, arguments, stall_s, on_progress)
+            except BaseException:
+                await self._end(child)
+                raise
         await self._keep(child, owner)
         return unpacked(answer)
 
@@ -155,14 +156,14 @@ class Children:
 
         Otherwise as `run`; the child ends with its job.
         """
-        child = await self._spawn(job)
-        self._busy.add(child)
-        try:
-            _make_idle(child.process.pid)
-            return unpacked(await child.do(job, arguments, stall_s))
-        finally:
-            await self._end(child)
-            self._tend()
+        with self._counted():
+            child = await self._spawn(job)
+            self._busy.add(child)
+            try:
+                _make_idle(child.process.pid)
+                return unpacked(await child.do(job, arguments, stall_s))
+            finally:
+                await self._end(child)
 
     async def release(self, owner: str) -> None:
         """End the child that is kept for an owner whose work is done."""
@@ -244,10 +245,17 @@ class Children:
         if over is not None:
             await self._end(over)
 
-    def _tend(self) -> None:
-        if self._resting is not None:
-            self._resting.cancel()
-        self._resting = asyncio.create_task(self._rest())
+    @contextlib.contextmanager
+    def _counted(self) -> Iterator[None]:
+        """For the time of a job; after it, those that are kept are seen to."""
+        self._jobs += 1
+        try:
+            yield
+        finally:
+            self._jobs -= 1
+            if self._resting is not None:
+                self._resting.cancel()
+            self._resting = asyncio.create_task(self._rest())
 
     async def _rest(self) -> None:
         """Fork the next child; later, end those that are kept."""
@@ -255,7 +263,8 @@ class Children:
         until_s = loop.time() + self._quiet_s
         await asyncio.sleep(min(AHEAD_S, self._quiet_s))
         is_missing = self._ahead is None or self._ahead.process.is_over
-        if self._forks_ahead and is_missing and not self._busy:
+        # A fork that takes too long ends the server, and with it all that it forked.
+        if self._forks_ahead and is_missing and not self._jobs:
             with contextlib.suppress(InstallFailed):  # `run` raises it, if it is so then, too
                 self._ahead = await self._spawn(ANY)
         await asyncio.sleep(until_s - loop.time())
