@@ -30,7 +30,9 @@ ROWS: dict[str, set[str]] = {
         "units",
         "behaviours",
         "devices",
+        "data",
         "pid",
+        "granted",
         "problem",
         "confinement",
         "release",
@@ -266,7 +268,7 @@ def test_the_store_says_who_needs_what(daemon: RunningHost) -> None:
     shown = daemon.run("store").ok().out.splitlines()
     own = next(line for line in shown if line.startswith("test_beacon-1.0"))
     assert BEACON_ID in own
-    assert re.fullmatch(r"4 wheels, \d+\.\d MB", shown[-1])
+    assert re.fullmatch(r"4 files, \d+\.\d MB", shown[-1])
 
 
 def test_one_fact_is_explained_whether_it_is_true_or_not(daemon: RunningHost) -> None:

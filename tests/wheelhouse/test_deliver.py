@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -63,7 +64,7 @@ def test_where_places_cannot_be_changed_it_is_replaced_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on a system that knows of no exchange."""
-    monkeypatch.setattr(disk, "_libc", object())
+    monkeypatch.setattr(disk, "_libc", SimpleNamespace(syncfs=lambda descriptor: 0))
     for release in (1, 2):
         target = build.deliver(made(tmp_path, release), tmp_path / "drive")
     assert sorted(path.name for path in target.iterdir()) == ["CONTENTS", "only-2"]

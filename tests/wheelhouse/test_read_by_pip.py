@@ -18,7 +18,7 @@ from nondum.wheelhouse.build import locking
 from nondum.wheelhouse.format import lock
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.target import Target
-from nondum.wheelhouse.store import bytecode, venvs
+from nondum.wheelhouse.store import bytecode, quota, venvs
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 
@@ -174,7 +174,7 @@ def test_venv_outlives_its_store_and_is_made_again_of_a_new_one(
     store, expected = Store(tmp_path / "store"), versions(locked(folder))
     wheels = stored(store, folder)
     venvs.make(tmp_path / "venv", PYTHON, wheels)
-    assert len(store.prune(set(), 0)) == len(wheels)
+    assert len(quota.prune([store], set(), 0)) == len(wheels)
     assert pip_reader.listed(tmp_path / "venv") == expected
     venvs.make(tmp_path / "venv", PYTHON, stored(store, folder))
     assert pip_reader.listed(tmp_path / "venv") == expected

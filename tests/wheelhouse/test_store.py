@@ -15,6 +15,7 @@ from tests.wheelhouse.file_systems import file_system, needs_mount
 from tests.wheelhouse.hostile_wheels import INFO, METADATA, WHEEL, Lie, WheelBuilder, record_of
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused
+from nondum.wheelhouse.store import quota
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 
@@ -197,10 +198,10 @@ def test_the_least_used_are_pruned_first(store: Store, tmp_path: Path) -> None:
     for age, stored in enumerate(wheels):
         os.utime(stored.folder, (1000 + age, 1000 + age))
     one, two, three = wheels
-    assert store.prune(keep=(), quota_bytes=10**9) == ()
-    assert store.prune(keep={one.sha256}, quota_bytes=one.size + three.size) == (two,)
+    assert quota.prune([store], (), 10**9) == ()
+    assert quota.prune([store], {one.sha256}, one.size + three.size) == (two.sha256,)
     assert {w.sha256 for w in store.listing()} == {one.sha256, three.sha256}
-    assert store.prune(keep=(), quota_bytes=0) == (one, three)
+    assert quota.prune([store], (), 0) == (one.sha256, three.sha256)
 
 
 def test_use_keeps_a_wheel_young(store: Store, tmp_path: Path) -> None:
@@ -209,7 +210,7 @@ def test_use_keeps_a_wheel_young(store: Store, tmp_path: Path) -> None:
     for stored in (first, second):
         os.utime(stored.folder, (1000, 1000))
     added(store, old)
-    assert store.prune(keep=(), quota_bytes=first.size) == (second,)
+    assert quota.prune([store], (), first.size) == (second.sha256,)
 
 
 def test_links_outlive_their_wheel(store: Store, tmp_path: Path) -> None:

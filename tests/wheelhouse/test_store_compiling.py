@@ -14,7 +14,7 @@ from tests.kit.payloads import make_wheel, sha256
 from tests.wheelhouse.file_systems import file_system, needs_mount
 
 from nondum.sdk.errors import InstallFailed
-from nondum.wheelhouse.store import bytecode, venvs
+from nondum.wheelhouse.store import bytecode, quota, venvs
 from nondum.wheelhouse.store.store import UNFINISHED, Store
 from nondum.wheelhouse.store.stored import StoredWheel
 
@@ -52,8 +52,8 @@ def test_compiled_bytes_count(store: Store, entry: StoredWheel) -> None:
     compiled = store.compile(entry.sha256)
     on_disk = sum((entry.root / path).stat().st_size for path in COMPILED)
     assert compiled.size == entry.size + on_disk
-    assert store.prune((), compiled.size) == ()
-    assert store.prune((), entry.size) == (compiled,)
+    assert quota.prune([store], (), compiled.size) == ()
+    assert quota.prune([store], (), entry.size) == (compiled.sha256,)
 
 
 def test_compiling_twice_does_nothing(store: Store, entry: StoredWheel) -> None:

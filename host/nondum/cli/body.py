@@ -93,7 +93,7 @@ def units(session: Session) -> None:
 @json_option
 @click.pass_obj
 def store(session: Session) -> None:
-    """The wheels that this host keeps.
+    """The wheels and data that this host keeps.
 
     Example: nondum store
     """
@@ -102,8 +102,28 @@ def store(session: Session) -> None:
         render.as_json(rows)
         return
     shown = [
-        {**row, "size": render.size(row["bytes"]), "sha256": row["sha256"][:12]} for row in rows
+        {
+            **row,
+            "file": row["wheel"] or "data",
+            "size": render.size(row["bytes"]),
+            "sha256": row["sha256"][:12],
+        }
+        for row in rows
     ]
-    table(shown, ["wheel", "size", "used_by", "sha256"], empty="the store is empty")
+    table(shown, ["file", "size", "used_by", "sha256"], empty="the store is empty")
     if rows:
-        click.echo(f"{len(rows)} wheels, {render.size(sum(row['bytes'] for row in rows))}")
+        click.echo(f"{len(rows)} files, {render.size(sum(row['bytes'] for row in rows))}")
+
+
+@click.command()
+@json_option
+@click.pass_obj
+def data(session: Session) -> None:
+    """Models, maps and other data that are here, and which components are shown them.
+
+    Example: nondum data
+    """
+    rows = session.ask("data")
+    if not session.as_json:
+        rows = [{**row, "size": render.size(row["bytes"])} for row in rows]
+    show(session, rows, ["data", "kind", "version", "size", "payload", "shown_to"], "no data")

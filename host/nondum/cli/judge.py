@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nondum.wheelhouse.trust.trust import Trust
 
 FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
+KEY = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 @click.command()
@@ -40,6 +41,9 @@ def inspect(session: Session, drive: Path) -> None:
         render.sentence(f"  built {view['built']} ({render.age(view['age_s'])} ago), {by}")
         for goal in view["goals"]:
             render.sentence(f"  goal: {goal}")
+        for brought in view["data"]:
+            told = f"{brought['name']} {brought['version']} ({brought['kind']})"
+            render.sentence(f"  data {told}: {', '.join(brought['files'])}")
         for component in view["components"]:
             can = ", ".join(component["behaviours"]) or "no behaviours"
             render.sentence(f"  component {component['id']}: {can}")
@@ -76,6 +80,11 @@ def loaded_payload(folder: Path) -> StagedPayload:
     return load(folder, listed)
 
 
+def size_of(folder: Path) -> str:
+    """The size of all files in a folder, for people."""
+    return render.size(sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()))
+
+
 def signed(folder: Path, trust: Trust | None = None) -> dict[str, Any]:
     """Whose signatures hold, by their names in a trust file or by fingerprints; else, why there is
     none. Whether they are trusted is not asked. Raises `PayloadRefused`, `DriveGone`.
@@ -108,10 +117,15 @@ def _view(payload: StagedPayload) -> dict[str, Any]:
         "summary": payload.manifest.summary,
         "bytes": listed.total_bytes,
         "goals": list(payload.goals),
+        "data": [
+            {"name": d.name, "kind": d.kind, "version": d.version, "files": list(d.files)}
+            for d in payload.manifest.data
+        ],
         "components": [
             {
                 "id": component.id,
                 "distribution": component.distribution,
+                "data": [need.name for need in component.data],
                 "behaviours": [b.name for b in payload.index[component.id].behaviours],
                 "wheels": [wheel.filename for wheel in payload.locks[component.id].wheels],
             }

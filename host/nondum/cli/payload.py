@@ -11,14 +11,14 @@ import click
 
 from nondum.cli import complete, render
 from nondum.cli.connection import json_option
-from nondum.cli.judge import FOLDER, inspect, loaded_payload, payloads
+from nondum.cli.judge import FOLDER, KEY, inspect, loaded_payload, payloads, size_of
+from nondum.cli.payload_data import data
 from nondum.cli.progress import ProgressLine
 from nondum.cli.session import Session
 from nondum.cli.verify import check, verify
 from nondum.sdk.errors import NondumError
 
 INSTALL_TIMEOUT_S = 600.0
-KEY = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 @click.group()
@@ -138,7 +138,7 @@ def build(
         render.as_json({"payloads": [str(folder) for folder in made], "targets": rows})
     elif not quiet:
         for folder in made:
-            click.echo(f"{folder}  {_size(folder)}")
+            click.echo(f"{folder}  {size_of(folder)}")
             _remark_lower_version(folder, before.get(folder.name))
             if told := costs.remark(loaded_payload(folder).contents, found[folder]):
                 render.sentence(told, colour="yellow", mark="warning: ")
@@ -341,10 +341,7 @@ def _remark_lower_version(folder: Path, before: str | None) -> None:
         render.sentence(told, colour="yellow", mark="warning: ")
 
 
-def _size(folder: Path) -> str:
-    return render.size(sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()))
-
-
+payload.add_command(data)
 payload.add_command(inspect)
 payload.add_command(check)
 payload.add_command(verify)

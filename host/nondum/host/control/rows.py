@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from nondum.host.control.news import Progress
 from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.drive import DriveRecord
 from nondum.host.core.records.journal import JournalEntry
 from nondum.host.core.records.payload import PayloadRecord
@@ -14,7 +15,7 @@ from nondum.host.core.records.safety import Safety
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.records.step import Step
 from nondum.host.core.row import Row
-from nondum.host.core.status import is_at_rest, waits_for_devices
+from nondum.host.core.status import is_at_rest, waits
 from nondum.host.trust.vouched import UNVOUCHED, Vouched
 from nondum.host.workers.optional_inputs import Choice, Source
 from nondum.host.workers.streams import StreamStatus
@@ -67,7 +68,7 @@ def problems_of(snapshot: Snapshot, places: Collection[str] = ()) -> Iterator[Pr
             yield from payload.problems
     for component in snapshot.components:
         yield from component.problems
-        yield from waits_for_devices(component)
+        yield from waits(component)
     for drive in snapshot.drives:
         yield from drive.problems
 
@@ -82,7 +83,7 @@ def payload_row(
 ) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
     on, if it does. `rollbacks` are the digests of those that people went back to, `components` all
-    that are here: devices that those of the payload wait for are told."""
+    that are here: devices and data that those of the payload wait for are told."""
     return {
         "payload": payload.payload_id,
         "key": payload.key,
@@ -92,9 +93,7 @@ def payload_row(
         "gone_back": payload.digest in rollbacks,
         "state": payload.step.value,
         "progress": progress.to_dict() if progress else None,
-        "waits_for": [
-            name for c in components if c.payload == payload.key for name in c.missing_devices
-        ],
+        "waits_for": [name for c in components if c.payload == payload.key for name in c.missing],
         "place": place,
         "signers": list(vouched.signers),
         "built": vouched.built,
@@ -148,9 +147,27 @@ def component_row(
         "units": [unit.name for unit in described.units],
         "behaviours": [behaviour.name for behaviour in described.behaviours],
         "devices": {claim.name: claim.device for claim in component.devices},
+        "data": {claim.need.name: claim.data for claim in component.data},
         "pid": pid,
         "granted": {},
         "problem": "; ".join(str(problem) for problem in component.problems),
+    }
+
+
+def data_row(data: DataRecord, components: Iterable[ComponentRecord]) -> Row:
+    """Data that are here, and which of the components are shown them."""
+    return {
+        "data": data.name,
+        "kind": data.kind,
+        "version": data.version,
+        "bytes": data.size,
+        "files": list(data.files),
+        "payload": data.payload_id,
+        "shown_to": [
+            component.id
+            for component in components
+            if any(claim.data == data.id for claim in component.data)
+        ],
     }
 
 
@@ -173,6 +190,7 @@ def offered_row(component: PeerComponent, host: str) -> Row:
         "units": [unit.name for unit in described.units],
         "behaviours": list(component.abilities),
         "devices": {},
+        "data": {},
         "pid": None,
         "granted": {},
         "problem": f"its host does not offer {withheld}" if withheld else "",
@@ -235,7 +253,6 @@ def journal_row(entry: JournalEntry) -> Row:
 
 
 def _state(component: ComponentRecord) -> str:
-    missing = component.missing_devices
-    if component.state is ComponentState.READY and missing:
-        return f"waits for {', '.join(missing)}"
+    if component.state is ComponentState.READY and component.missing:
+        return f"waits for {', '.join(component.missing)}"
     return component.state.value

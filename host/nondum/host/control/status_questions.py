@@ -13,6 +13,7 @@ from nondum.host.control.machine import Machine
 from nondum.host.control.news import News
 from nondum.host.control.rows import (
     component_row,
+    data_row,
     drive_row,
     gone_back,
     host_state,
@@ -122,15 +123,25 @@ class StatusQuestions:
             for offered in peer.components
         ]
 
+    async def data(self, arguments: Arguments) -> list[Row]:
+        """The data that are here, and which components are shown them."""
+        snapshot = self.catalogue.snapshot()
+        return [data_row(data, snapshot.components) for data in snapshot.data]
+
     async def store(self, arguments: Arguments) -> list[Row]:
-        """The wheels that are kept, and which payloads need them."""
+        """The wheels and files of data that are kept, and which payloads need them."""
         ids = {payload.key: payload.payload_id for payload in self.catalogue.snapshot().payloads}
         rows = await self.stored()
         return [{**row, "used_by": [ids.get(key, key) for key in row["used_by"]]} for row in rows]
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""
-        return {"components": self.components, "status": self.status, "store": self.store}
+        return {
+            "components": self.components,
+            "data": self.data,
+            "status": self.status,
+            "store": self.store,
+        }
 
 
 def _gone_back(payload: PayloadRecord) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.device import DeviceNode
 from nondum.sdk.frozen import frozen
 
@@ -157,6 +158,27 @@ class AttachDevice(Effect):
     component: str
     need: str
     nodes: tuple[DeviceNode, ...]
+
+
+@frozen
+class ShowData(Effect):
+    """Show data to a component, instead of any that it is shown for that need."""
+
+    component: str
+    payload: str
+    """Key of the component's payload."""
+    need: str
+    data: DataRecord
+
+
+@frozen
+class HideData(Effect):
+    """Show a component no data for a need."""
+
+    component: str
+    payload: str
+    """Key of the component's payload."""
+    need: str
 
 
 @frozen

@@ -7,6 +7,7 @@ from dataclasses import field
 
 from nondum.host.core import payload_key
 from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.device import DeviceRecord, KnownDevice
 from nondum.host.core.records.drive import DriveRecord
 from nondum.host.core.records.goal import GoalRecord
@@ -58,8 +59,11 @@ class HostState:
     """Drive or payload key → how many daemons in a row died while they were at it."""
     is_stopped: bool = False
     """Whether the daemon that wrote this ended because it was told to."""
+    data: Mapping[str, DataRecord] = field(default_factory=dict)
+    """Id → data that active payloads bring. Not kept when the daemon ends: the next one has them
+    when their payloads are active again."""
     peers: Mapping[str, PeerRecord] = field(default_factory=dict)
-    """Key → a peer that is there. Not kept when the daemon ends: the next one looks again."""
+    """Key → a peer that is there. Not kept either: the next daemon looks again."""
     safety: Safety = Safety.OFF
     """Which payloads are left alone. Not kept either: each daemon finds that out as it starts."""
 
@@ -85,6 +89,7 @@ class HostState:
             payloads=tuple(self.payloads.values()),
             drives=tuple(self.drives.values()),
             devices=tuple(self.devices.values()),
+            data=tuple(sorted(self.data.values(), key=lambda d: (d.name, d.id))),
             known_devices=tuple(self.known_devices.values()),
             mounts=tuple(self.mounts.values()),
             connections=tuple(sorted(self.connections.items())),

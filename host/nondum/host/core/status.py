@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nondum.host.core import missing_devices
+from nondum.host.core import waiting
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.drive import DriveState
 from nondum.host.core.records.payload import PayloadRecord
@@ -40,7 +40,8 @@ def _counted(number: int, noun: str, doing: str) -> str:
     return f"1 {noun} is {doing}" if number == 1 else f"{number} {noun}s are {doing}"
 
 
-def waits_for_devices(component: ComponentRecord) -> Iterator[Problem]:
-    """That a component waits for devices, if it does and for nothing else."""
-    if told := missing_devices.waits(component):
-        yield Problem("DEVICE_MISSING", f"{component.id} {told}")
+def waits(component: ComponentRecord) -> Iterator[Problem]:
+    """That a component waits for devices or data, if it does and for nothing else."""
+    if told := waiting.waits(component):
+        code = "DEVICE_MISSING" if component.missing_devices else "DATA_MISSING"
+        yield Problem(code, f"{component.id} {told}")

@@ -1,16 +1,20 @@
-"""What is said of a component that is well and waits for a device."""
+"""What is said of a component that is well and waits for a device, or for data."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from nondum.host.core.records.component import ComponentRecord, ComponentState
 
 
 def waits(component: ComponentRecord) -> str:
-    """`waits for its device head`; empty where it waits for none, or has other troubles."""
-    missing = component.missing_devices
-    if component.state is not ComponentState.READY or not missing:
+    """`waits for its device head`, `waits for its data weights`; empty where it waits for nothing,
+    or has other troubles."""
+    if component.state is not ComponentState.READY or component.is_ready:
         return ""
-    return f"waits for its device{'s' if len(missing) > 1 else ''} {' and '.join(missing)}"
+    devices = _called("device", "devices", component.missing_devices)
+    data = _called("data", "data", component.missing_data)
+    return f"waits for its {' and its '.join((*devices, *data))}"
 
 
 def waits_to_act(component: ComponentRecord) -> str:
@@ -18,3 +22,8 @@ def waits_to_act(component: ComponentRecord) -> str:
     told, names = waits(component), ", ".join(component.abilities)
     then = f" (then it can {names})" if names else ""
     return told and f"{component.id} {told}{then}"
+
+
+def _called(one: str, several: str, names: Sequence[str]) -> tuple[str, ...]:
+    kind = several if len(names) > 1 else one
+    return (f"{kind} {' and '.join(names)}",) if names else ()

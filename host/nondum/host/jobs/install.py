@@ -16,12 +16,13 @@ from nondum.host.trust import chain
 from nondum.sdk.codec.values import to_plain
 from nondum.sdk.errors import InstallFailed, Problem
 from nondum.wheelhouse.build import source
+from nondum.wheelhouse.format.data import BroughtData
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.manifest import ComponentManifest
 from nondum.wheelhouse.payload import memory
 from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.payload import StagedPayload
-from nondum.wheelhouse.store import disk, venvs
+from nondum.wheelhouse.store import disk, quota, venvs
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 from nondum.wheelhouse.store.unpacking import THREADS
@@ -45,6 +46,9 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         have = look.memory_for(arguments, facts)
         look.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
     root.mkdir(parents=True, exist_ok=True)
+    data = look.data_store(arguments)
+    for entry in staged.data_files:
+        data.keep(folder / entry.path, entry.sha256)
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
         synced = pool.submit(_sync, folder, with_wheels=by_pip)
         if by_pip:
@@ -71,6 +75,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         "gpu": to_plain(gpu),
         "grant": grant.to_dict(),
         "goals": list(staged.goals),
+        "data": [_told_data(staged, brought) for brought in staged.manifest.data],
     }
 
 
@@ -112,35 +117,38 @@ def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
     return {locked.sha256 for group in wheels.values() for locked in group}
 
 
-def wheels_in_use(arguments: Arguments, report: Report) -> dict[str, list[str]]:
-    """Payload key → hashes of the wheels that it needs, of the payload folders given."""
+def in_use(arguments: Arguments, report: Report) -> dict[str, set[str]]:
+    """Payload key → hashes of the wheels and data that it needs, of the payload folders given."""
     facts = look.facts_of(arguments)
-    folders = [Path(folder) for folder in arguments["folders"]]
+    staged = [look.load_staged(Path(f)) for f in arguments["folders"] if Path(f).exists()]
     return {
-        folder.name: sorted(stored_names(look.load_staged(folder).wheels(facts)))
-        for folder in folders
-        if folder.exists()
+        one.folder.name: stored_names(one.wheels(facts)) | {d.sha256 for d in one.data_files}
+        for one in staged
     }
 
 
 def prune(arguments: Arguments, report: Report) -> list[str]:
-    """Delete wheels that no payload needs, least recently used first, down to the quota."""
-    used = {sha256 for group in wheels_in_use(arguments, report).values() for sha256 in group}
-    gone = Store(Path(arguments["store"])).prune(used, arguments["quota_mb"] * 1024 * 1024)
-    return [stored.filename for stored in gone]
+    """Delete wheels and data that no payload needs, least recently used first, down to the quota:
+    the hashes of what is gone."""
+    used = {sha256 for group in in_use(arguments, report).values() for sha256 in group}
+    stores = Store(Path(arguments["store"])), look.data_store(arguments)
+    return list(quota.prune(stores, used, arguments["quota_mb"] * 1024 * 1024))
 
 
 def listing(arguments: Arguments, report: Report) -> list[dict[str, Any]]:
-    """What the store holds, and which payloads need it."""
-    used = wheels_in_use(arguments, report)
+    """What the stores of wheels and data hold, and which payloads need it; data have no name."""
+    used = in_use(arguments, report)
+    wheels = Store(Path(arguments["store"])).listing()
+    found = [(stored.filename, stored.size, stored.sha256) for stored in wheels]
+    found += [("", data.size, data.sha256) for data in look.data_store(arguments).kept()]
     return [
         {
-            "wheel": stored.filename,
-            "bytes": stored.size,
-            "used_by": sorted(key for key, group in used.items() if stored.sha256 in group),
-            "sha256": stored.sha256,
+            "wheel": filename,
+            "bytes": size,
+            "used_by": sorted(key for key, group in used.items() if sha256 in group),
+            "sha256": sha256,
         }
-        for stored in Store(Path(arguments["store"])).listing()
+        for filename, size, sha256 in found
     ]
 
 
@@ -183,6 +191,17 @@ def _checked(store: Store, locked: LockedWheel, alive: Callable[[], None]) -> St
     )
 
 
+def _told_data(staged: StagedPayload, brought: BroughtData) -> dict[str, Any]:
+    sizes = {entry.path: entry.size for entry in staged.data_files}
+    return {
+        "name": brought.name,
+        "kind": brought.kind,
+        "version": brought.version,
+        "files": list(brought.files),
+        "size": sum(sizes[path] for path in brought.paths),
+    }
+
+
 def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> Any:
     venv = root / component.id
     site_packages = venvs.site_packages(venv)
@@ -200,5 +219,6 @@ def _told(staged: StagedPayload, component: ComponentManifest, root: Path) -> An
             component.devices,
             component.units,
             component.limits,
+            component.data,
         )
     )

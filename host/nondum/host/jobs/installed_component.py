@@ -8,6 +8,7 @@ from typing import Any
 
 from nondum.sdk.description import DeviceNeed, PluginDescription
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.data import DataNeed
 from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.manifest import UnitMount
 
@@ -30,3 +31,4 @@ class InstalledComponent:
     """Where units sit, as the manifest says."""
     limits: WorkerLimits
     """What it is granted instead of what the host gives each worker."""
+    data: tuple[DataNeed, ...]

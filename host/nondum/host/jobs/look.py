@@ -10,6 +10,7 @@ import hashlib
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.build import verification
 from nondum.wheelhouse.format import confinement, contents
-from nondum.wheelhouse.format.contents import Contents
+from nondum.wheelhouse.format.contents import Contents, Entry
 from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.lock import LockedWheel
 from nondum.wheelhouse.format.signatures import Grant, Verdict, Verifier
@@ -38,6 +39,7 @@ from nondum.wheelhouse.payload import drive, host_facts, payload, preflight
 from nondum.wheelhouse.payload.host_facts import HostFacts
 from nondum.wheelhouse.payload.memory import Memory, Promised
 from nondum.wheelhouse.payload.payload import StagedPayload
+from nondum.wheelhouse.store.data_store import DataStore
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import StoredWheel
 from nondum.wheelhouse.wheels.dist_info import Needs
@@ -114,11 +116,14 @@ def copy(arguments: Arguments, report: Report) -> dict[str, int]:
     facts = admitted(arguments, judged, staged)
     needed = chosen(staged, facts)
     known = known_wheels(arguments, staged, facts)
+    data, stored = data_store(arguments), known_data(arguments, staged)
     missing = {locked.path for locked in needed if locked.sha256 not in known}
+    missing |= {entry.path for entry in staged.data_files if entry not in stored}
+    data.link(sorted(stored, key=lambda e: e.path), staging, partial(report, "check", 0, 1))
     pace = paced(report, str(folder))
     copied = drive.copy(folder, listed, staging, pace, wanted=lambda e: e.path in missing)
     known_bytes = sum(locked.size for locked in needed if locked.sha256 in known)
-    return {"copied": copied, "known": known_bytes}
+    return {"copied": copied, "known": known_bytes + sum(entry.size for entry in stored)}
 
 
 @frozen
@@ -178,8 +183,14 @@ def preflight_problems(
         store = Store(Path(arguments["store"]))
         wheels = {wheel.sha256 for lock in staged.locks.values() for wheel in lock.wheels}
         stored = {sha256 for sha256 in wheels if store.has(sha256)}
+    known = known_data(arguments, staged)
     return preflight.preflight(
-        staged.manifest, staged.locks, facts, minimum_nondum=minimum_nondum, stored=stored
+        staged.manifest,
+        staged.locks,
+        facts,
+        minimum_nondum=minimum_nondum,
+        stored=stored,
+        data_bytes=sum(entry.size for entry in staged.data_files if entry not in known),
     )
 
 
@@ -240,6 +251,17 @@ def known_wheels(
     store = Store(Path(arguments["store"]))
     found = {wheel.sha256: store.get(wheel.sha256) for wheel in chosen(staged, facts)}
     return {sha256: stored for sha256, stored in found.items() if stored is not None}
+
+
+def data_store(arguments: Arguments) -> DataStore:
+    """Where this host keeps data: beside its wheels."""
+    return DataStore(Path(arguments["store"]).with_name("data"))
+
+
+def known_data(arguments: Arguments, staged: StagedPayload) -> frozenset[Entry]:
+    """The files of a payload's data that this host has."""
+    store = data_store(arguments)
+    return frozenset(entry for entry in staged.data_files if store.has(entry))
 
 
 def _found(folder: Path, verifier: Verifier) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def outline(arguments: Arguments, report: Report) -> list[list[Any]]:
 
 def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     """Whether a payload, of which the metadata is in `folder`, would run here: the files that are
-    still `needed`, path, hash and size of each wheel that the store has not.
+    still `needed`, path, hash and size of each wheel and file of data that this host has not.
 
     Raises `PayloadRefused` with all that keeps it from running here.
     """
@@ -82,8 +82,9 @@ def judge(arguments: Arguments, report: Report) -> dict[str, Any]:
     facts = replace(facts, memory=look.memory_for(arguments, facts))
     minimum = listed.minimum_nondum
     look.refuse_if_any(look.preflight_problems(arguments, staged, facts, minimum_nondum=minimum))
-    known = look.known_wheels(arguments, staged, facts)
+    known, stored = look.known_wheels(arguments, staged, facts), look.known_data(arguments, staged)
     missing = {w.path for w in look.chosen(staged, facts) if w.sha256 not in known}
+    missing |= {entry.path for entry in staged.data_files if entry not in stored}
     needed = [entry for entry in listed.entries if entry.path in missing]
     fetched_mb = sum(entry.size for entry in needed) // _MB
     beside = replace(facts, free_disk_mb=max(0, facts.free_disk_mb - fetched_mb))

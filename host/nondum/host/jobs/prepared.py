@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nondum.host.core.records.component import ComponentRecord, ComponentState
+from nondum.host.core.records.data import DataClaim
 from nondum.host.core.records.device import DeviceClaim
 from nondum.host.core.records.mount import MountPose
 from nondum.host.jobs.installed_component import InstalledComponent
@@ -22,12 +23,13 @@ class Prepared(InstalledComponent):
     """One component, installed and not yet active; its id is its name on this host."""
 
     scratch: Path
+    shown: Path
+    """Where the data are that it is shown."""
 
     @classmethod
-    def parse(cls, said: Mapping[str, Any], name: str, scratch: Path) -> Prepared:
+    def parse(cls, said: Mapping[str, Any], name: str, scratch: Path, shown: Path) -> Prepared:
         """Read an `InstalledComponent`. It comes from our own child and is trusted."""
-        # what is cached may be told by a version that knew no limits
-        told = {"limits": {}, **said, "id": name, "scratch": str(scratch)}
+        told = {**said, "id": name, "scratch": str(scratch), "shown": str(shown)}
         return from_plain(cls, told, said["id"])
 
     def spec(self, payload: str, limits: Limits) -> WorkerSpec:
@@ -47,6 +49,7 @@ class Prepared(InstalledComponent):
             permissions=self.permissions,
             limits=replace(limits, **changed),
             asked=self.limits,
+            shown=self.shown if self.data else None,
         )
 
     def record(self, payload: str) -> ComponentRecord:
@@ -67,6 +70,7 @@ class Prepared(InstalledComponent):
             permissions=self.permissions,
             settings=self.settings,
             devices=tuple(DeviceClaim(n.name, n.match, n.optional) for n in self.devices),
+            data=tuple(DataClaim(need) for need in self.data),
         )
 
     def poses(self, host: str) -> tuple[MountPose, ...]:

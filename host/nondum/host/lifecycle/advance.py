@@ -48,6 +48,7 @@ from nondum.host.core.transitions import TRANSITIONS
 from nondum.host.lifecycle import (
     component_rules,
     crash_attribution,
+    data_allocation,
     device_allocation,
     drive_rules,
     goal_rules,
@@ -132,12 +133,15 @@ def follow(turn: Turn, event: Event) -> None:
 
 
 def settle(turn: Turn, before: HostState) -> Outcome:
-    """End a turn: idle drives, claims of devices, and the revision if anything was recomposed."""
+    """End a turn: idle drives, claims of devices and data, and the revision if anything was
+    recomposed."""
     drive_rules.release_idle_drives(turn)
     rebuilding.settle(turn, before)
     if turn.state.components != before.components or turn.state.devices != before.devices:
         device_allocation.settle(turn, before.devices)
-    parts = ("components", "mounts", "connections", "former")
+    if turn.state.components != before.components or turn.state.data != before.data:
+        data_allocation.settle(turn)
+    parts = ("components", "mounts", "connections", "former", "data")
     is_recomposed = any(getattr(turn.state, part) != getattr(before, part) for part in parts)
     if is_recomposed or peer_rules.offers(turn.state) != peer_rules.offers(before):
         turn.change(revision=before.revision + 1)

@@ -13,12 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from nondum.host.core.effects import AttachDevice, DetachDevice, RestartWorker
+from nondum.host.core.effects import AttachDevice, DetachDevice
 from nondum.host.core.events.devices import DeviceClaimed, DeviceReleased
-from nondum.host.core.events.payloads import RetryAsked
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.device import DeviceClaim, DeviceNode, DeviceRecord
-from nondum.host.core.transitions import COMPONENT_TRANSITIONS
+from nondum.host.lifecycle.retrying import try_again
 from nondum.host.lifecycle.turn import Turn
 from nondum.host.sources.devices.matching import chosen, serving
 
@@ -109,17 +108,7 @@ def settle(turn: Turn, before: Mapping[str, DeviceRecord]) -> None:
                 new.device and not old.device
                 for old, new in zip(component.devices, claims, strict=True)
             ):
-                _try_again(turn, id)
-
-
-def _try_again(turn: Turn, id: str) -> None:
-    """Start a component again that failed, maybe for want of the device that it has now."""
-    component = turn.state.components[id]
-    state = COMPONENT_TRANSITIONS.get((component.state, RetryAsked))
-    if state is not None:
-        turn.put_component(replace(component, state=state, problems=()))
-        turn.events.append(RetryAsked(component.payload, f"{id} has its device again"))
-        turn.effects.append(RestartWorker(id))
+                try_again(turn, id, "has its device again")
 
 
 def _move(

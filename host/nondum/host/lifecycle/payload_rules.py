@@ -279,7 +279,11 @@ def _activate(turn: Turn, payload: PayloadRecord, event: PayloadActivated) -> No
         turn.put_component(replace(component, payload_id=payload.payload_id))
     drop_replaced(turn, payload)
     turn.forget(payload.payload_id)
-    turn.change(mounts={**_by_unit(event.mounts), **turn.state.mounts})
+    brought = (replace(data, payload_id=payload.payload_id) for data in event.data)
+    turn.change(
+        mounts={**_by_unit(event.mounts), **turn.state.mounts},
+        data={**turn.state.data, **{data.id: data for data in brought}},
+    )
     reached = admission.reached(turn.state, payload, event)
     turn.change(
         highwater={**turn.state.highwater, payload.payload_id: reached},

@@ -72,8 +72,8 @@ class Turn:
         self.change(drives=_without(self.state.drives, drive))
 
     def drop_components(self, payload: str) -> None:
-        """Withdraw a payload's components, and the mounts that only it had said; what they could do
-        is remembered."""
+        """Withdraw a payload's components and data, and the mounts that only it had said; what they
+        could do is remembered."""
         gone = {id: c for id, c in self.state.components.items() if c.payload == payload}
         mounts = {
             unit: pose
@@ -81,7 +81,8 @@ class Turn:
             if pose.origin == "person" or unit.split("__")[1] not in gone
         }
         kept = {id: c for id, c in self.state.components.items() if id not in gone}
-        self.change(components=kept, mounts=mounts)
+        data = {id: d for id, d in self.state.data.items() if d.payload != payload}
+        self.change(components=kept, mounts=mounts, data=data)
         if gone:
             self._remember(self.state.payloads[payload], gone.values())
 

@@ -91,6 +91,8 @@ class Executor:
             effects.RestartWorker: self._restart,
             effects.AttachDevice: self._attach,
             effects.DetachDevice: self._detach,
+            effects.ShowData: self.installation.shown.show,
+            effects.HideData: self.installation.shown.hide,
         }
 
     async def rebuild(self, state: HostState, at: Moment) -> HostState:
@@ -203,6 +205,8 @@ def _queue_of(effect: Effect) -> str:
         case effects.ReadDrive() | effects.ReleaseDrive():
             return f"drive {effect.drive}"
         case effects.RestartWorker() | effects.AttachDevice() | effects.DetachDevice():
+            return f"component {effect.component}"
+        case effects.ShowData() | effects.HideData():
             return f"component {effect.component}"
         case _:
             raise TypeError(f"no lane for {effect!r}")

@@ -43,6 +43,7 @@ from nondum.host.manager.installed_payload import InstalledPayload
 from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_cache import PayloadCache
 from nondum.host.manager.payload_trust import PayloadTrust
+from nondum.host.manager.shown_data import ShownData
 from nondum.host.manager.state_folders import Folders, missing, move, remove, sweep
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.role import Role
@@ -87,6 +88,7 @@ class Installation:
         self._host, self._folders, self._options = host, folders, options
         self._trust = trust
         self._workers, self._children, self._emit = workers, children, emit
+        self.shown = ShownData(folders, workers)
         self._installed: dict[str, InstalledPayload] = {}
         self._reservations = MemoryReservations(workers.pids_of)
         self._queue = Queue(AT_ONCE)
@@ -186,6 +188,7 @@ class Installation:
         ):
             return (BesideRefused(key, reason),)
         await self._workers.ended(effect.after)
+        await self.shown.prepare(key, (c.id for c in installed.components if c.data))
         role = Role.BESIDE if effect.beside else Role.ACTIVE
         specs = installed.specs(self._options.limits)
         started = await asyncio.gather(
@@ -212,7 +215,9 @@ class Installation:
             for record in installed.records()
         )
         poses = installed.poses(self._host)
-        return (PayloadActivated(key, records, poses, installed.grant, installed.goals),)
+        return (
+            PayloadActivated(key, records, poses, installed.grant, installed.goals, installed.data),
+        )
 
     async def compile(self, effect: effects.CompileWheels) -> tuple[Event, ...]:
         """Byte-compile in the store what it runs, and link that into its venvs.
@@ -348,7 +353,7 @@ class Installation:
     def _parsed(
         self, key: str, told: Mapping[str, Any], renamed: Mapping[str, str]
     ) -> InstalledPayload:
-        return InstalledPayload.parse(key, told, renamed, partial(self._folders.scratch, key))
+        return InstalledPayload.parse(key, told, renamed, self._folders)
 
     def _tell_queued(self, payload: str, ahead: int) -> None:
         self._emit(ProgressMade(payload, "queued" if ahead else "copy", 0, ahead))

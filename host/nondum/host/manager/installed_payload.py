@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.mount import MountPose
 from nondum.host.jobs.prepared import Prepared
 from nondum.host.manager.headroom import Needs
+from nondum.host.manager.state_folders import Folders
 from nondum.host.workers.spec import Limits, WorkerSpec
 from nondum.sdk.frozen import frozen
+from nondum.wheelhouse.format.data import FOLDER
 from nondum.wheelhouse.format.signatures import Grant
 from nondum.wheelhouse.payload.gpu import Gpu
 
@@ -34,6 +37,7 @@ class InstalledPayload:
     """Whether its workers would start no sooner if its modules were compiled once more."""
     told: Mapping[str, Any]
     """What the job told, from which this is."""
+    data: tuple[DataRecord, ...] = ()
 
     @classmethod
     def parse(
@@ -41,17 +45,20 @@ class InstalledPayload:
         key: str,
         told: Mapping[str, Any],
         renamed: Mapping[str, str],
-        scratch: Callable[[str], Path],
+        folders: Folders,
     ) -> InstalledPayload:
         """Read what the job `install` told. It comes from our own child and is trusted.
 
-        `renamed` has the names on this host of components that have another one in the payload;
-        `scratch` gives the scratch folder of a component.
+        `renamed` has the names on this host of components that have another one in the payload.
         """
         named = [(said, renamed.get(said["id"], said["id"])) for said in told["components"]]
+        data = folders.payload(key) / FOLDER
         return cls(
             key,
-            tuple(Prepared.parse(said, name, scratch(name)) for said, name in named),
+            tuple(
+                Prepared.parse(said, name, folders.scratch(key, name), folders.shown(key, name))
+                for said, name in named
+            ),
             Needs.parse(told["needs"]),
             Grant.parse(told["grant"]),
             tuple(told["goals"]),
@@ -59,6 +66,7 @@ class InstalledPayload:
             told["fresh"],
             not told["uncompiled"],
             told,
+            tuple(_brought(said, key, data / said["name"]) for said in told["data"]),
         )
 
     @property
@@ -77,3 +85,17 @@ class InstalledPayload:
     def poses(self, host: str) -> tuple[MountPose, ...]:
         """Where its units sit, as its manifest says."""
         return tuple(pose for component in self.components for pose in component.poses(host))
+
+
+def _brought(said: Mapping[str, Any], key: str, folder: Path) -> DataRecord:
+    """Data that it brings; the payload's id is given as they are entered."""
+    return DataRecord(
+        payload=key,
+        payload_id="",
+        name=said["name"],
+        kind=said["kind"],
+        version=said["version"],
+        folder=folder,
+        files=tuple(said["files"]),
+        size=said["size"],
+    )

@@ -110,6 +110,11 @@ class Folders:
         """A payload's venvs, one for each component."""
         return self.root / "venvs" / payload
 
+    def shown(self, payload: str, component: str) -> Path:
+        """Where a component finds the data that it is shown; with its venv, so that its worker sees
+        it wherever that may look."""
+        return self.venvs(payload) / ".data" / component
+
     def scratch(self, payload: str, component: str) -> Path:
         """What a component may write to while it is here; releases of it have one each."""
         return self.scratches_of(payload) / component

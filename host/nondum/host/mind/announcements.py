@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from nondum.host.core import missing_devices
+from nondum.host.core import waiting
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.peer import PeerComponent
 from nondum.host.mind.composition import Composition
@@ -165,7 +165,7 @@ def _health(component: _Component) -> str:
         return "is ready"
     if isinstance(component, PeerComponent):
         return "is not ready, says its host"
-    if told := missing_devices.waits(component):
+    if told := waiting.waits(component):
         return told
     reason = f": {component.problems[0]}" if component.problems else ""
     return f"is not ready, it is {component.state.value}{reason}"

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Any, TypeAlias, cast
 
-from nondum.host.core import missing_devices
+from nondum.host.core import waiting
 from nondum.host.core.placed import place_of
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.peer import PeerComponent
@@ -128,7 +128,7 @@ def _unready(snapshot: Snapshot) -> Iterator[tuple[str, Reason]]:
 
 
 def _why_not_ready(component: ComponentRecord) -> Reason:
-    if told := missing_devices.waits(component):
+    if told := waiting.waits(component):
         return Reason(f"{component.id} {told}", waits=True)
     reason = f", {component.problems[0].message}" if component.problems else ""
     return Reason(f"{component.id} is {component.state.value}{reason}")

@@ -335,8 +335,8 @@ _WAITS = {GoalState.QUEUED: "", GoalState.HALTED: "is "}
 
 
 def _parts(composition: Composition) -> tuple[object, ...]:
-    """What an action's failure may come from: who is here, with which devices, and where units sit.
-    Workers that are started again by themselves change nothing of that."""
+    """What an action's failure may come from: who is here, with which devices and data, and where
+    units sit. Workers that are started again by themselves change nothing of that."""
     snapshot, given_up = composition.snapshot, ComponentState.QUARANTINED
-    own = ((c.id, c.devices, c.state is given_up) for c in snapshot.components)
+    own = ((c.id, c.devices, c.data, c.state is given_up) for c in snapshot.components)
     return (*composition.contributions, *own, *snapshot.mounts)

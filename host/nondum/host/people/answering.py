@@ -6,7 +6,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable
 
-from nondum.host.core import missing_devices
+from nondum.host.core import waiting
 from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.status import is_at_rest
 from nondum.host.mind.mind import Mind
@@ -50,8 +50,8 @@ class Answering:
         if question is Question.ABILITIES:
             found = await asyncio.to_thread(views.goals())
             components = self._mind.beliefs.snapshot.components
-            waiting = filter(None, map(missing_devices.waits_to_act, components))
-            return abilities(found["can"], coming, tuple(waiting))
+            waits = filter(None, map(waiting.waits_to_act, components))
+            return abilities(found["can"], coming, tuple(waits))
         plan = views.plan()
         steps = [row for one in (plan, *plan["beside"]) for row in one["steps"]]
         lent = {*self._busy()} - {row["component"] for row in steps}

@@ -53,7 +53,7 @@ class Boxed:
         if spec is None:
             return Ground(base_interpreter(), self._places)
         permissions = _CHANGES_GROUND & frozenset(spec.permissions)
-        folders = (*spec.site_packages, spec.scratch)
+        folders = (*spec.readable, spec.scratch)
         usual = Ground(spec.python, self._places, permissions)
         if usual.carries(spec.python, folders, permissions):
             return usual
@@ -79,7 +79,7 @@ class Boxed:
             "outside": bubblewrap.OUTSIDE,
             "seen_outside": bubblewrap.seen_outside(ground),
             "hides_outside": "outside" not in kept,
-            "code": [str(folder) for folder in spec.site_packages],
+            "code": [str(folder) for folder in spec.readable],
             "protects_code": "code" not in kept,
             "scratch": str(spec.scratch),
             "maps_scratch": user is not None and os.geteuid() != 0,

@@ -71,7 +71,7 @@ class Held:
             yield Entry(restrictions, user=user)
             return
         with landlock.ruleset(
-            readable=(*spec.site_packages, *bubblewrap.prefixes(), *_more_files(spec)),
+            readable=(*spec.readable, *bubblewrap.prefixes(), *_more_files(spec)),
             writable=(spec.scratch,),
             nodes=nodes,
             has_network=has_network,

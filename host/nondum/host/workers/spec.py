@@ -96,6 +96,13 @@ class WorkerSpec:
     limits: Limits = Limits()
     asked: WorkerLimits = WorkerLimits()
     """What its payload asked for and was granted; in `limits` already but for the start."""
+    shown: Path | None = None
+    """Folder of the data that it is shown; None: it asks for none."""
+
+    @property
+    def readable(self) -> tuple[Path, ...]:
+        """Folders of the host that its worker may read."""
+        return (*self.site_packages, *((self.shown,) if self.shown else ()))
 
     @property
     def package(self) -> str:

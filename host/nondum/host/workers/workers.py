@@ -72,6 +72,8 @@ class Workers:
         self._supervisors: dict[str, Supervisor] = {}
         self._extra_workers = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
+        self._shown: dict[str, dict[str, Mapping[str, Any]]] = {}
+        """Component → need → the data that it is shown for it."""
         self._mounts: Mapping[str, Any] = {}
         core_value_types()  # read now: a worker may be started when there is little memory
         self._call_ids = itertools.count(1)
@@ -128,6 +130,7 @@ class Workers:
             if old is not None:
                 old.withdraw()
                 self._extra_workers.add(old, self._devices.pop(component, {}))
+                self._shown.pop(component, None)
             self._extra_workers.drop(new)
             self._supervisors[component] = new
             new.come_into_force()
@@ -162,6 +165,7 @@ class Workers:
             return
         if supervisor.role is Role.ACTIVE:
             self._extra_workers.add(supervisor, self._devices.pop(component, {}))
+            self._shown.pop(component, None)
         try:
             await supervisor.stop(grace_s)
         finally:
@@ -249,12 +253,23 @@ class Workers:
             await self._extra_workers.released(str(each["node"]))
         device = {**nodes[0], "nodes": nodes}
         self._devices.setdefault(component, {})[need] = device
-        await self._tell_of_device(component, lambda worker: worker.attach(need, device))
+        await self._tell_worker(component, lambda worker: worker.attach(need, device))
 
     async def detach(self, component: str, need: str) -> None:
         """Withdraw a device."""
         self._devices.get(component, {}).pop(need, None)
-        await self._tell_of_device(component, lambda worker: worker.detach(need))
+        await self._tell_worker(component, lambda worker: worker.detach(need))
+
+    async def show(self, component: str, need: str, data: Mapping[str, Any] | None) -> None:
+        """Tell a component's worker, and those after it, which data it is shown for a need; None:
+        none any more."""
+        shown = self._shown.setdefault(component, {})
+        if data is None:
+            shown.pop(need, None)
+        else:
+            shown[need] = data
+        body = {"need": need, "shown": data}
+        await self._tell_worker(component, lambda worker: worker.link.request("data", body))
 
     def claims(self, component: str) -> tuple[FactKnown | StreamFlowing, ...]:
         """What a component's worker says is so now: the news of it that still hold.
@@ -331,6 +346,7 @@ class Workers:
             "settings": spec.settings,
             "scratch": str(spec.scratch),
             "devices": self._devices.get(spec.component, {}),
+            "data": self._shown.get(spec.component, {}),
             "mounts": self._mounts,
             "limits": {"memory_mb": spec.limits.memory_mb, "tasks": spec.limits.tasks},
         }
@@ -417,8 +433,8 @@ class Workers:
                 except errors.ProtocolViolation as error:
                     log.warning("%s cannot be told %s: %s", component, event, error)
 
-    async def _tell_of_device(
-        self, component: str, tell: Callable[[Worker], Awaitable[None]]
+    async def _tell_worker(
+        self, component: str, tell: Callable[[Worker], Awaitable[object]]
     ) -> None:
         try:
             await tell(self._worker(component))

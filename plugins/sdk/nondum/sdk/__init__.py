@@ -94,7 +94,7 @@ if TYPE_CHECKING:
     from nondum.sdk.plugin import Plugin, describe, load
     from nondum.sdk.threads import ThreadContext, ThreadInputStream, ThreadOutputStream
     from nondum.sdk.ticked import Status, TickedBehaviour
-    from nondum.sdk.workplace import Device
+    from nondum.sdk.workplace import Data, Device
 
 _HOME = {
     "Context": "context",
@@ -181,6 +181,7 @@ _HOME = {
     "ThreadOutputStream": "threads",
     "Status": "ticked",
     "TickedBehaviour": "ticked",
+    "Data": "workplace",
     "Device": "workplace",
 }
 """Public name → the module that it is defined in."""
@@ -216,6 +217,7 @@ __all__ = [
     "ConfigRefused",
     "Context",
     "Covariance",
+    "Data",
     "Depth",
     "Detection",
     "Detections",

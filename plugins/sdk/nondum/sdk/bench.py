@@ -112,11 +112,13 @@ class Bench:
         settings: Mapping[str, Any] | None = None,
         devices: Mapping[str, str] | None = None,
         mounts: Mapping[str, tuple[Vector, Vector]] | None = None,
+        data: Mapping[str, Path] | None = None,
     ) -> None:
         """Load, describe and start a plugin.
 
         `plugin` is an entry point's value, a module, a class or an object. `devices`: declared name
         → node. `mounts`: unit → position in metres and roll, pitch, yaw in radians, on the body.
+        `data`: declared name → a file, or a folder of files.
         Raises what the plugin's description or start hook raises, as `WorkerFailed`.
         """
         loaded = load(plugin)
@@ -136,7 +138,9 @@ class Bench:
         self.side = self.on_loop(lambda: HostSide(plugin, self._notify))
         """The host's side; reach it through `on_loop` only."""
         welcome = {"host": host, "component": component, "scratch": str(scratch)}
-        self._start(welcome | self._given(settings or {}, devices or {}, mounts or {}))
+        given = self._given(settings or {}, devices or {}, mounts or {})
+        shown = {name: _shown(name, path) for name, path in (data or {}).items()}
+        self._start({**welcome, **given, "data": shown})
 
     def _given(
         self,
@@ -351,6 +355,14 @@ class WorkerFactory:
         with contextlib.ExitStack() as stopping:  # all of them, whatever one of them says
             for bench in self._benches:
                 stopping.callback(bench.stop)
+
+
+def _shown(name: str, path: Path) -> dict[str, Any]:
+    """Data of a file, or of all files in a folder, as a host tells of them."""
+    folder = path if path.is_dir() else path.parent
+    found = sorted(path.rglob("*")) if path.is_dir() else [path]
+    files = [str(file.relative_to(folder)) for file in found if file.is_file()]
+    return {"name": name, "kind": "", "version": "0", "folder": str(folder), "files": files}
 
 
 def _mount(host: str, xyz: Vector, rpy: Vector) -> list[Any]:

@@ -19,7 +19,7 @@ from nondum.sdk.faults import Faults
 from nondum.sdk.messages import Message, value_to_wire
 from nondum.sdk.ports import InputPort, OutputPort
 from nondum.sdk.raised import module_of, raised_in
-from nondum.sdk.workplace import Device, Workplace
+from nondum.sdk.workplace import Data, Device, Workplace
 
 _M = TypeVar("_M", bound=Message)
 
@@ -149,6 +149,10 @@ class Context:
     def device(self, name: str) -> Device | None:
         """The device that was granted for a declared need; None while there is none."""
         return self._workplace.devices.get(name)
+
+    def data(self, name: str) -> Data | None:
+        """The data that are shown for a declared need; None while there are none."""
+        return self._workplace.data.get(name)
 
     def input(self, stream: str) -> InputStream[Any]:
         """Open a stream that the action reads, by its object."""

@@ -19,7 +19,7 @@ from nondum.sdk.packets import Handle, Packets, adopt, discard
 from nondum.sdk.performer import Performer
 from nondum.sdk.plugin import Plugin, version_of
 from nondum.sdk.wire import MAX_PACKET, PROTOCOL_VERSIONS, Hello
-from nondum.sdk.workplace import Device, Place, Workplace
+from nondum.sdk.workplace import Data, Device, Place, Workplace
 
 HEARTBEAT_S = 2.0
 CROWDED_EVERY_S = 0.5
@@ -206,7 +206,7 @@ class Session:
             self._crowded = 0
 
     def _rewire(self, verb: str, body: Body) -> None:
-        """Disconnect a stream, or grant or withdraw a device."""
+        """Disconnect a stream, or grant or withdraw a device or data."""
         match verb:
             case "unproduce":
                 self._place.output(body["stream"]).producer.disconnect(body["consumer"])
@@ -217,6 +217,10 @@ class Session:
                 self._place.devices[body["device"]] = device
             case "detach":
                 self._place.devices.pop(body["device"], None)
+            case "data" if body["shown"] is None:
+                self._place.data.pop(body["need"], None)
+            case "data":
+                self._place.data[body["need"]] = Data.from_wire(body["shown"])
             case _:
                 raise WorkerFailed(Problem("VERB_UNKNOWN", f"this SDK has no verb {verb!r}"))
 

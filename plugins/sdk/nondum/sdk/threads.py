@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from nondum.sdk.context import Context, InputStream, OutputStream
 from nondum.sdk.messages import Message
-from nondum.sdk.workplace import Device
+from nondum.sdk.workplace import Data, Device
 
 _T = TypeVar("_T")
 _M = TypeVar("_M", bound=Message)
@@ -137,6 +137,10 @@ class ThreadContext:
     def device(self, name: str) -> Device | None:
         """See `Context.device`."""
         return self._crossing.call(self._context.device, name)
+
+    def data(self, name: str) -> Data | None:
+        """See `Context.data`."""
+        return self._crossing.call(self._context.data, name)
 
     def input(self, stream: str) -> ThreadInputStream[Any]:
         """See `Context.input`."""

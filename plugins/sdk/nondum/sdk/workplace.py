@@ -59,6 +59,31 @@ class Device:
 
 
 @frozen
+class Data:
+    """Data that the host shows to the component: a model, a map …"""
+
+    name: str
+    kind: str
+    version: str
+    folder: Path
+    """Read-only. What was opened can be read on when the data are gone."""
+    files: tuple[Path, ...]
+    """All of them, in the order of the payload that brings them."""
+
+    @property
+    def path(self) -> Path:
+        """The first file; of most data, the only one."""
+        return self.files[0]
+
+    @classmethod
+    def from_wire(cls, body: Mapping[str, Any]) -> Data:
+        """Make one of what a host tells of it. Raises `KeyError`, `TypeError`."""
+        folder = Path(body["folder"])
+        files = tuple(folder / file for file in body["files"])
+        return cls(body["name"], body["kind"], body["version"], folder, files)
+
+
+@frozen
 class Place:
     """Who and where a worker is: the host's welcome."""
 
@@ -72,6 +97,7 @@ class Place:
     scratch: Path = Path()
     """A folder of the component's own, emptied when it is removed."""
     devices: Mapping[str, Device] = field(default_factory=dict)
+    data: Mapping[str, Data] = field(default_factory=dict)
     mounts: Mapping[str, Any] = field(default_factory=dict)
     limits: Mapping[str, Any] = field(default_factory=dict)
 
@@ -93,6 +119,7 @@ class Place:
                     name: Device.from_wire(device, body.get("device_nodes", {}).get(name))
                     for name, device in body.get("devices", {}).items()
                 },
+                data={need: Data.from_wire(shown) for need, shown in body.get("data", {}).items()},
                 mounts=dict(body.get("mounts", {})),
                 limits=dict(body.get("limits", {})),
             )
@@ -109,6 +136,7 @@ class Workplace:
         self.tell = tell
         """Send an event to the host: name, body, call id."""
         self.devices = dict(place.devices)
+        self.data = dict(place.data)
         self.frames = FrameTree.from_wire(place.mounts)
         self.values: dict[tuple[str, ...], Message] = {}
         """(predicate, object, …) → value of that fact."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -31,6 +32,7 @@ from nondum.wheelhouse.wheels import wheel
 
 MINIMUM_NONDUM = "0.1"
 """The oldest nondum that reads what is written here."""
+_PIECE = 4 * 1024 * 1024
 PROCESSES = 4
 """pips at once: they wait for the index most of the time."""
 
@@ -83,7 +85,7 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         seal(folder, said.id, _version(own), options.release, fleet=fleet, hosts=hosts)
         options.finish(folder)
         progress("copying it to the drive", steps - 1, steps)
-        target = deliver(folder, drive)
+        target = deliver(folder, drive, progress)
         progress("done", steps, steps)
         return target
 
@@ -163,12 +165,21 @@ def _write(
         if not (wheels / path.name).exists():
             os.link(path, wheels / path.name)
     shutil.copyfile(package / manifest.NAME, folder / manifest.NAME)
+    link_data(folder, source.data_of(package, said))
     if wanted := source.goals_of(package):
         (folder / goals.NAME).write_bytes(goals.to_bytes(wanted))
     for component in said.components:
         text = locking.lock_text(locked)
         (folder / lock.file_name(component.id)).write_text(text, encoding="utf-8")
     (folder / index.NAME).write_bytes(index.to_bytes(described))
+
+
+def link_data(folder: Path, files: Mapping[str, Path]) -> None:
+    """Put data in a payload's folder that is still to be sealed and delivered: by links, since they
+    may be larger than the file system that it is on."""
+    for path, at in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).symlink_to(at.resolve())
 
 
 def _version(own: Path) -> str:
@@ -219,16 +230,55 @@ def seal(
     (folder / contents.NAME).write_bytes(listed.to_bytes())
 
 
-def deliver(folder: Path, drive: Path) -> Path:
+def deliver(folder: Path, drive: Path, progress: Progress = lambda what, done, total: None) -> Path:
     """Put the folder on the drive: copied beside, then put in the place of the one that is there,
     at one stroke where the file system can, so that a host that has it plugged in sees one or the
-    other."""
+    other. What links lead to is copied. Once it returns, the drive may be pulled.
+
+    Raises `InstallFailed` (DISK_FULL, IO_ERROR).
+    """
     target = drive / "nondum" / folder.name
     beside = target.with_name(f".{folder.name}.part")
     shutil.rmtree(beside, ignore_errors=True)
-    shutil.copytree(folder, beside)
+    total = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    done = 0
+
+    def copied(size: int) -> None:
+        nonlocal done
+        done += size
+        progress("copying it to the drive", done, total)
+
+    try:
+        shutil.copytree(folder, beside, copy_function=partial(_copy, copied))
+    except InstallFailed:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
     if not (target.exists() and disk.exchange(beside, target)):
         shutil.rmtree(target, ignore_errors=True)
         beside.rename(target)
     shutil.rmtree(beside, ignore_errors=True)
+    disk.sync_file_system(target.parent)
     return target
+
+
+def _copy(copied: Callable[[int], None], source: str, target: str) -> str:
+    """Copy one file for `shutil.copytree`, which takes what is returned for its new path."""
+    try:
+        with open(source, "rb") as read, open(target, "wb") as written:  # noqa: PTH123  # texts
+            while piece := read.read(_PIECE):
+                written.write(piece)
+                copied(len(piece))
+    except OSError as error:
+        raise _undelivered(error, target) from error
+    return target
+
+
+def _undelivered(error: OSError, target: str) -> InstallFailed:
+    code = "DISK_FULL" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "IO_ERROR"
+    fix = "see whether the drive is there, and may be written to"
+    if code == "DISK_FULL":
+        fix = "take a larger drive, or delete something from it"
+    elif error.errno == errno.EFBIG:  # FAT takes no file of 4 GiB
+        fix = "format the drive with a file system for large files, as exFAT or ext4"
+    text = f"cannot be copied to the drive: {error.strerror}"
+    return InstallFailed(Problem(code, text, where=target, fix=fix))

@@ -48,6 +48,26 @@ def goals_of(package: Path) -> tuple[str, ...]:
     return goals.parse(path.read_bytes(), str(path)) if path.is_file() else ()
 
 
+def data_of(package: Path, said: Manifest) -> dict[str, Path]:
+    """Path in the payload → where in the source folder it is, of the data that it brings: there it
+    is called the same. Raises `PayloadRefused` (SOURCE_INCOMPLETE)."""
+    found = {path: package / path for brought in said.data for path in brought.paths}
+    missing = [path for path, at in found.items() if not at.is_file()]
+    if missing:
+        raise PayloadRefused(
+            *(
+                Problem(
+                    "SOURCE_INCOMPLETE",
+                    f"there is no file {path}",
+                    where=str(package),
+                    fix="put the file there, or leave it out of `files`",
+                )
+                for path in missing
+            )
+        )
+    return found
+
+
 def description_problems(
     said: Manifest, described: Mapping[str, PluginDescription], judge: Judge
 ) -> tuple[Problem, ...]:

@@ -11,8 +11,9 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from nondum.sdk.description import DeviceNeed
 from nondum.sdk.frozen import frozen
-from nondum.wheelhouse.format import confinement, limits, names, tables
+from nondum.wheelhouse.format import confinement, data, limits, names, tables
 from nondum.wheelhouse.format.confinement import Level
+from nondum.wheelhouse.format.data import BroughtData, DataNeed
 from nondum.wheelhouse.format.device_rules import wrong_rules
 from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.tables import Form, Report, Table
@@ -22,7 +23,9 @@ PERMISSIONS = ("audio", "devices", "gpu", "network")
 """What components may ask for."""
 GOALS = "goals"
 """The permission to give a host goals, which a payload asks for by having a goal.txt."""
-GRANTABLE = (*PERMISSIONS, GOALS)
+DATA = "data"
+"""The permission to bring data that components of other payloads read, too."""
+GRANTABLE = (*PERMISSIONS, GOALS, DATA)
 """What a role may give."""
 
 _PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
@@ -74,6 +77,7 @@ class ComponentManifest:
     settings: Mapping[str, Any] = field(default_factory=dict)
     limits: WorkerLimits = WorkerLimits()
     """What it asks for instead of what a host gives each worker."""
+    data: tuple[DataNeed, ...] = ()
 
 
 @frozen
@@ -88,20 +92,23 @@ class Manifest:
     homepage: str
     requires: Requires
     components: tuple[ComponentManifest, ...]
+    data: tuple[BroughtData, ...] = ()
     startup_hooks: tuple[str, ...] = ()
     """Files of wheels that an interpreter would run at its start: their packer knows that workers
     do not, and that they are left out."""
 
 
 def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
-    """Check and parse a manifest; a payload that brings goals need not bring components.
+    """Check and parse a manifest; a payload that brings goals or data need not bring components.
 
     Raises `PayloadRefused` with everything wrong in it.
     """
     root, report = tables.read(text, "MANIFEST", where)
     requires = _requires(root.table("requires"))
+    brought = tuple(data.parse(table) for table in root.tables("data"))
+    brings_more = brings_goals or bool(brought)
     components = tuple(
-        _component(table) for table in root.tables("component", required=not brings_goals)
+        _component(table) for table in root.tables("component", required=not brings_more)
     )
     manifest = Manifest(
         id=root.text("id", _PAYLOAD_ID),
@@ -112,15 +119,18 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
         homepage=root.text("homepage", default=""),
         requires=replace(requires, memory_mb=max(requires.memory_mb, _asked_mb(components))),
         components=components,
+        data=brought,
         startup_hooks=root.texts("startup_hooks"),
     )
     root.close()
-    if not (manifest.components or brings_goals or report.problems):
-        report.add("KEY", "a payload brings at least one [[component]]")
+    if not (manifest.components or brings_more or report.problems):
+        report.add("KEY", "a payload brings at least one [[component]] or [[data]]")
+    _tell_twice(report, "data", (d.name for d in manifest.data))
     _tell_twice(report, "component", (c.id for c in manifest.components))
     for component in manifest.components:
         _tell_twice(report, f"device of {component.id}", (d.name for d in component.devices))
         _tell_twice(report, f"unit of {component.id}", (u.name for u in component.units))
+        _tell_twice(report, f"data of {component.id}", (d.name for d in component.data))
     report.raise_if_any()
     return manifest
 
@@ -151,6 +161,7 @@ def _component(table: Table) -> ComponentManifest:
         permissions=table.texts("permissions"),
         settings=table.free("settings"),
         limits=limits.parse(table.optional_table("limits")),
+        data=tuple(data.parse_need(need) for need in table.tables("data")),
     )
     for permission in component.permissions:
         if permission not in PERMISSIONS:

@@ -14,7 +14,7 @@ from nondum.sdk.errors import Problem
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format import goals as goal_file
 from nondum.wheelhouse.format.limits import WorkerLimits, not_granted
-from nondum.wheelhouse.format.manifest import GOALS, GRANTABLE, Manifest
+from nondum.wheelhouse.format.manifest import DATA, GOALS, GRANTABLE, Manifest
 
 MAX_SIGNATURE_BYTES = 8 * 1024
 
@@ -48,6 +48,7 @@ class Grant:
         asked = [(c.id, permission) for c in manifest.components for permission in c.permissions]
         if goals:
             asked.append((goal_file.NAME, GOALS))
+        asked.extend((f"data {brought.name}", DATA) for brought in manifest.data)
         by = f"the role {self.role}" if self.role else "its signer"
         denied = tuple(
             Problem(

@@ -29,6 +29,9 @@ MAX_ENTRIES = 4096
 """What is looked at in a drive's folder of payloads, whatever it is."""
 
 _CHUNK = 1024 * 1024
+_WRITTEN_OUT = 64 * 1024 * 1024
+"""Of a large file, each time this much was copied, it is written to the disk: several gigabytes
+would fill the memory of a small host, and take minutes at the end."""
 _OPEN_ROOT = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 """A slot may be a link to what stands for the drive; what is on a drive may not."""
 _OPEN_FOLDER = _OPEN_ROOT | os.O_NOFOLLOW
@@ -174,8 +177,11 @@ def _copy_bytes(
         with target.open("xb") as out:
             for piece in _pieces(descriptor, entry.size + 1, folder):
                 digest.update(piece)
-                size += len(piece)
                 out.write(piece)
+                if size // _WRITTEN_OUT < (size + len(piece)) // _WRITTEN_OUT:
+                    out.flush()
+                    os.fdatasync(out.fileno())
+                size += len(piece)
                 copied(len(piece))
     except OSError as error:
         raise _unstaged(target, error) from error

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -14,8 +14,8 @@ from typing import TypeVar
 from nondum.sdk.description import DeviceNeed, PluginDescription
 from nondum.sdk.errors import NondumError, PayloadRefused, Problem
 from nondum.sdk.frozen import frozen
-from nondum.wheelhouse.format import goals, index, lock, manifest, tables
-from nondum.wheelhouse.format.contents import Contents
+from nondum.wheelhouse.format import data, goals, index, lock, manifest, tables
+from nondum.wheelhouse.format.contents import Contents, Entry
 from nondum.wheelhouse.format.index import Index
 from nondum.wheelhouse.format.lock import Lock, LockedWheel
 from nondum.wheelhouse.format.manifest import ComponentManifest, Manifest
@@ -42,6 +42,11 @@ class StagedPayload:
     goals: tuple[str, ...] = ()
     """What it wants, in words."""
 
+    @property
+    def data_files(self) -> tuple[Entry, ...]:
+        """The files of all data that it brings."""
+        return tuple(entry for entry in self.contents.entries if is_data(entry.path))
+
     def wheels(self, facts: HostFacts) -> dict[str, tuple[LockedWheel, ...]]:
         """The wheels of each component on such a host. Raises `PayloadRefused`."""
         return select(self.manifest, self.locks, facts)
@@ -67,8 +72,13 @@ def load(folder: Path, listed: Contents) -> StagedPayload:
 
 
 def is_metadata(path: str) -> bool:
-    """Whether a listed file is needed to judge the payload, rather than a wheel."""
-    return not path.startswith("wheels/")
+    """Whether a listed file is needed to judge the payload, rather than a wheel or data."""
+    return not (path.startswith("wheels/") or is_data(path))
+
+
+def is_data(path: str) -> bool:
+    """Whether a listed file is of some `[[data]]`."""
+    return path.startswith(f"{data.FOLDER}/")
 
 
 def oversized(listed: Contents) -> Iterator[Problem]:
@@ -80,7 +90,7 @@ def oversized(listed: Contents) -> Iterator[Problem]:
             yield _too_large(entry.path, most, entry.size)
     total = sum(entry.size for entry in found)
     if total > MAX_METADATA:
-        yield _too_large("everything but the wheels together", MAX_METADATA, total)
+        yield _too_large("everything but wheels and data together", MAX_METADATA, total)
 
 
 def _most_bytes(path: str) -> int:
@@ -94,7 +104,7 @@ def _most_bytes(path: str) -> int:
 
 
 def _too_large(what: str, most: int, size: int) -> Problem:
-    text, fix = "is too long", "pack models and data as wheels, and say less about them"
+    text, fix = "is too long", "bring models and maps as `[[data]]`, and say less about them"
     return Problem("TOO_LARGE", text, what, f"at most {most} bytes", f"{size} bytes", fix)
 
 
@@ -171,12 +181,23 @@ def _disagreements(
             if sizes.get(locked.path) != (locked.sha256, locked.size):
                 text = f"{locked.path} is not in the contents list as the lock has it"
                 yield Problem("LOCK_PATH", text, where=lock.file_name(component))
+    yield from _disagreeing_data(sizes.keys(), said)
     ids = {component.id for component in said.components}
     for missing in sorted(ids - described.keys()):
         yield Problem("INDEX_INVALID", f"component {missing!r} is missing", where=index.NAME)
     for unknown in sorted(described.keys() - ids):
         text = f"component {unknown!r} is not in the manifest"
         yield Problem("INDEX_INVALID", text, where=index.NAME)
+
+
+def _disagreeing_data(listed: Collection[str], said: Manifest) -> Iterator[Problem]:
+    named = {path for brought in said.data for path in brought.paths}
+    there = {path for path in listed if is_data(path)}
+    for path in sorted(named - there):
+        yield Problem("FILE_MISSING", "is data by the manifest, and not listed", where=path)
+    for path in sorted(there - named):
+        text = "is listed, and no [[data]] of the manifest names it"
+        yield Problem("MANIFEST_VALUE", text, where=path, fix="name it in `files`, or leave it out")
 
 
 def _part(problems: list[Problem], parse: Callable[[], _T]) -> _T | None:

@@ -53,11 +53,12 @@ def preflight(
     *,
     minimum_nondum: str = "0",
     stored: Collection[str] = (),
+    data_bytes: int = 0,
 ) -> tuple[Problem, ...]:
     """Everything that keeps this payload from running here.
 
     `minimum_nondum` is what the contents list asks for; `stored` are the hashes of wheels that this
-    host has already, which take no more of its disk.
+    host has already, which take no more of its disk, and `data_bytes` what it lacks of the data.
     """
     problems = [
         *_version_problems(manifest, facts, minimum_nondum),
@@ -74,7 +75,7 @@ def preflight(
     except PayloadRefused as error:
         return (*problems, *error.problems)
     problems.extend(_unlocked(manifest, locks, chosen))
-    return (*problems, *_disk_problems(manifest, chosen, facts, stored))
+    return (*problems, *_disk_problems(manifest, chosen, facts, stored, data_bytes))
 
 
 def _unlocked(
@@ -219,10 +220,11 @@ def _disk_problems(
     chosen: Mapping[str, Sequence[LockedWheel]],
     facts: HostFacts,
     stored: Collection[str],
+    data_bytes: int,
 ) -> Iterator[Problem]:
     """What is copied stays until all of it is unpacked, so both are on the disk then."""
     wheels = {w.sha256: w for group in chosen.values() for w in group if w.sha256 not in stored}
-    size = sum(wheel.size + wheel.unpacked for wheel in wheels.values())
+    size = data_bytes + sum(wheel.size + wheel.unpacked for wheel in wheels.values())
     needed = max(manifest.requires.disk_mb, _whole_mb(size))
     if needed > facts.free_disk_mb:
         yield _short(needed, facts, manifest.id)

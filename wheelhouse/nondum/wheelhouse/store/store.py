@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse.store import bytecode, checking, disk, unpacking
+from nondum.wheelhouse.store.quota import Kept
 from nondum.wheelhouse.store.stored import FILES, MANIFEST, CompiledFiles, StoredWheel, read_entry
 from nondum.wheelhouse.store.unpacking import Progress, Source, Unpacked
 
@@ -165,22 +166,10 @@ class Store:
             folder.rename(doomed)
             shutil.rmtree(doomed)
 
-    def prune(self, keep: Collection[str], quota_bytes: int) -> tuple[StoredWheel, ...]:
-        """Delete wheels outside `keep`, least recently used first, until the rest fits the quota.
-
-        Returns what was deleted.
-        """
-        by_use = sorted(self.listing(), key=lambda w: w.folder.stat().st_mtime)
-        total = sum(stored.size for stored in by_use)
-        deleted = []
-        for stored in by_use:
-            if total <= quota_bytes:
-                break
-            if stored.sha256 not in keep:
-                self.remove(stored.sha256)
-                total -= stored.size
-                deleted.append(stored)
-        return tuple(deleted)
+    def kept(self) -> Iterator[Kept]:
+        """All stored wheels, for what prunes them."""
+        for stored in self.listing():
+            yield Kept(stored.sha256, stored.size, stored.folder.stat().st_mtime)
 
     def sweep(self) -> tuple[Path, ...]:
         """Delete what an interrupted run left half done; returns what it was."""

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from nondum.host.core.events.event import Event
 from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.mount import MountPose
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
@@ -103,11 +104,14 @@ class PayloadActivated(Event):
     """What it may have."""
     goals: tuple[str, ...] = ()
     """What it wants, in words."""
+    data: tuple[DataRecord, ...] = ()
+    """What it brings for components to read."""
 
     def to_dict(self) -> dict[str, Any]:
         """Only names: what the components are stands in the catalogue."""
         told = {"payload": self.payload, "components": [c.id for c in self.components]}
-        return {**told, "goals": list(self.goals)} if self.goals else told
+        more = {"goals": list(self.goals), "data": [brought.name for brought in self.data]}
+        return told | {key: value for key, value in more.items() if value}
 
 
 @frozen

@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from nondum.host.core.records.data import DataClaim
 from nondum.host.core.records.device import DeviceClaim
 from nondum.sdk.description import PluginDescription
 from nondum.sdk.errors import Problem
@@ -50,6 +51,8 @@ class ComponentRecord:
     settings: Mapping[str, Any] = field(default_factory=dict)
     devices: tuple[DeviceClaim, ...] = ()
     problems: tuple[Problem, ...] = ()
+    data: tuple[DataClaim, ...] = ()
+    """What it is shown. Not kept: each daemon settles it again."""
 
     @property
     def abilities(self) -> tuple[str, ...]:
@@ -58,11 +61,23 @@ class ComponentRecord:
 
     @property
     def is_ready(self) -> bool:
-        """Whether its worker answers and every required device is there."""
-        return self.state is ComponentState.READY and not self.missing_devices
+        """Whether its worker answers, and all devices and data are there that it needs."""
+        return self.state is ComponentState.READY and not self.missing
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The names of all its needs that nothing here meets, and that it does not act without."""
+        return (*self.missing_devices, *self.missing_data)
 
     @property
     def missing_devices(self) -> tuple[str, ...]:
         """The names of its needs that no device serves, and that it does not act without."""
         claims = (claim for claim in self.devices if not claim.optional)
         return tuple(claim.name for claim in claims if claim.device is None)
+
+    @property
+    def missing_data(self) -> tuple[str, ...]:
+        """The names of its needs of data that nothing here meets, and that it does not act
+        without."""
+        claims = (claim for claim in self.data if not claim.need.optional)
+        return tuple(claim.need.name for claim in claims if claim.data is None)

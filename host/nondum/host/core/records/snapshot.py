@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 
 from nondum.host.core.records.component import ComponentRecord
+from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.device import DeviceRecord, KnownDevice
 from nondum.host.core.records.drive import DriveRecord
 from nondum.host.core.records.goal import GoalRecord
@@ -28,6 +29,7 @@ class Snapshot:
     payloads: tuple[PayloadRecord, ...] = ()
     drives: tuple[DriveRecord, ...] = ()
     devices: tuple[DeviceRecord, ...] = ()
+    data: tuple[DataRecord, ...] = ()
     known_devices: tuple[KnownDevice, ...] = ()
     """Those that were here, whether they are or not; last seen last."""
     mounts: tuple[MountPose, ...] = ()

@@ -11,7 +11,7 @@ from nondum.host.core.records.payload import PayloadRecord
 from nondum.host.core.records.safety import Safety
 from nondum.host.core.records.snapshot import Snapshot
 from nondum.host.core.records.step import Step
-from nondum.host.core.status import is_at_rest, waits_for_devices
+from nondum.host.core.status import is_at_rest, waits
 from nondum.host.mind.goals import GivenGoal, GoalState
 from nondum.sdk.errors import Problem
 from nondum.sdk.frozen import frozen
@@ -102,7 +102,7 @@ def _of_components(snapshot: Snapshot) -> Iterator[StateReason]:
             about, told = f"component {component.id}", f"{component.id} does not work"
             payload = component.payload_id
             yield refusal(State.HELP, about, told, component.problems, payload=payload)
-        for problem in waits_for_devices(component):
+        for problem in waits(component):
             yield StateReason(
                 State.HELP, f"component {component.id}", problem.message, problem.code
             )

@@ -10,6 +10,11 @@ CODES = (
         "nothing, or `nondum payload uninstall` it first",
     ),
     Code(
+        "DATA_MISSING",
+        "Data that the component needs are not here.",
+        "plug in a drive that brings such data; the component starts by itself then",
+    ),
+    Code(
         "DEVICE_MISSING",
         "A device that the component needs is not plugged in.",
         "plug the device in; the component starts by itself then",
