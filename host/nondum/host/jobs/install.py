@@ -46,9 +46,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
         have = look.memory_for(arguments, facts)
         look.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
     root.mkdir(parents=True, exist_ok=True)
-    data = look.data_store(arguments)
-    for entry in staged.data_files:
-        data.keep(folder / entry.path, entry.sha256)
+    _keep_data(arguments, staged)
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
         synced = pool.submit(_sync, folder, with_wheels=by_pip)
         if by_pip:
@@ -101,6 +99,18 @@ def _make_with_pip(
         # pip tells nothing of its progress: that it is at work is all that there is to report.
         alive = partial(report, "pip", number, len(selected))
         venvs.make_with_pip(venv, python, staged.folder, chosen, alive)
+
+
+def _keep_data(arguments: Arguments, staged: StagedPayload) -> None:
+    """Have the store know the payload's data, and their folders on disk."""
+    store, folders = look.data_store(arguments), set[Path]()
+    for entry in staged.data_files:
+        path = staged.folder / entry.path
+        store.keep(path, entry.sha256)
+        inside = len(path.relative_to(staged.folder).parts) - 1
+        folders.update(path.parents[:inside])
+    for folder in folders:
+        disk.sync(folder)
 
 
 def _sync(folder: Path, *, with_wheels: bool) -> None:
