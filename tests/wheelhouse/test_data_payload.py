@@ -80,36 +80,36 @@ def test_data_meet_a_need_by_all_that_it_says(asked: DataNeed, *, is_met: bool) 
     assert asked.is_met_by("gguf", "tiny", "1.2") is is_met
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    {
-        "no-name": (f"[[data]]\n{PLAIN.replace('name', '#')}", ["MANIFEST_KEY"]),
-        "no-kind": (f"[[data]]\n{PLAIN.replace('kind', '#')}", ["MANIFEST_KEY"]),
-        "bad-name": (f"[[data]]\n{PLAIN.replace('yolo', 'Yo lo', 1)}", ["MANIFEST_VALUE"]),
-        "no-files": ("[[data]]\nname = 'a'\nkind = 'b'\nfiles = []\n", ["MANIFEST_VALUE"]),
-        "path-up": (f"[[data]]\n{PLAIN.replace('yolo.onnx', '../a')}", ["MANIFEST_VALUE"]),
-        "path-absolute": (f"[[data]]\n{PLAIN.replace('yolo.onnx', '/a')}", ["MANIFEST_VALUE"]),
-        "file-twice": (
-            "[[data]]\nname = 'a'\nkind = 'b'\nfiles = ['c', 'c']\n",
-            ["MANIFEST_VALUE"],
-        ),
-        "version": (f"[[data]]\n{PLAIN}version = 'new'\n", ["MANIFEST_VALUE"]),
-        "unknown-key": (f"[[data]]\n{PLAIN}size = 3\n", ["MANIFEST_KEY"]),
-        "name-twice": (f"[[data]]\n{PLAIN}[[data]]\n{PLAIN}", ["MANIFEST_TWICE"]),
-        "neither-kind-nor-data": (
-            f"{COMPONENT}[[component.data]]\nname = 'w'\n",
-            ["MANIFEST_VALUE"],
-        ),
-        "need-version": (
-            f"{COMPONENT}[[component.data]]\nname = 'w'\nkind = 'k'\nversion = 'new'\n",
-            ["MANIFEST_VALUE"],
-        ),
-        "need-twice": (
-            COMPONENT + "[[component.data]]\nname = 'w'\nkind = 'k'\n" * 2,
-            ["MANIFEST_TWICE"],
-        ),
-    }.values(),
-)
+WRONG = {
+    "no-name": (f"[[data]]\n{PLAIN.replace('name', '#')}", ["MANIFEST_KEY"]),
+    "no-kind": (f"[[data]]\n{PLAIN.replace('kind', '#')}", ["MANIFEST_KEY"]),
+    "bad-name": (f"[[data]]\n{PLAIN.replace('yolo', 'Yo lo', 1)}", ["MANIFEST_VALUE"]),
+    "no-files": ("[[data]]\nname = 'a'\nkind = 'b'\nfiles = []\n", ["MANIFEST_VALUE"]),
+    "path-up": (f"[[data]]\n{PLAIN.replace('yolo.onnx', '../a')}", ["MANIFEST_VALUE"]),
+    "path-absolute": (f"[[data]]\n{PLAIN.replace('yolo.onnx', '/a')}", ["MANIFEST_VALUE"]),
+    "file-twice": (
+        "[[data]]\nname = 'a'\nkind = 'b'\nfiles = ['c', 'c']\n",
+        ["MANIFEST_VALUE"],
+    ),
+    "version": (f"[[data]]\n{PLAIN}version = 'new'\n", ["MANIFEST_VALUE"]),
+    "unknown-key": (f"[[data]]\n{PLAIN}size = 3\n", ["MANIFEST_KEY"]),
+    "name-twice": (f"[[data]]\n{PLAIN}[[data]]\n{PLAIN}", ["MANIFEST_TWICE"]),
+    "neither-kind-nor-data": (
+        f"{COMPONENT}[[component.data]]\nname = 'w'\n",
+        ["MANIFEST_VALUE"],
+    ),
+    "need-version": (
+        f"{COMPONENT}[[component.data]]\nname = 'w'\nkind = 'k'\nversion = 'new'\n",
+        ["MANIFEST_VALUE"],
+    ),
+    "need-twice": (
+        COMPONENT + "[[component.data]]\nname = 'w'\nkind = 'k'\n" * 2,
+        ["MANIFEST_TWICE"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "told"), WRONG.values(), ids=WRONG)
 def test_wrong_data_are_refused(text: str, told: list[str]) -> None:
     assert codes(text) == told
 
