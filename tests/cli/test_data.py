@@ -58,7 +58,7 @@ def test_a_component_that_waits_for_data_says_so_until_they_are_here(
     daemon.until_component("reader", "ready")
     head, row = daemon.run("data").ok().out.splitlines()
     assert head.split() == COLUMNS
-    assert row.split() == ["tiny", "gguf", "1", "2.0", "MB", "org.example.tiny", "reader"]
+    assert row.split() == ["tiny", "gguf", "1", "1.9", "MB", "org.example.tiny", "reader"]
     (said,) = daemon.run("data", "--json").ok().json
     assert (said["bytes"], said["files"], said["shown_to"]) == (
         2_000_000,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +19,8 @@ from tests.kit.signing import Key, sign_payload, trust_of
 from tests.wheelhouse.hostile_wheels import WheelBuilder
 
 from nondum.host.jobs import look
+from nondum.sdk.errors import PayloadRefused
+from nondum.wheelhouse.build import data_payload
 from nondum.wheelhouse.format.signatures import UnsignedAllowed, Verdict
 from nondum.wheelhouse.payload import payload
 from nondum.wheelhouse.payload.memory import Promised
@@ -179,6 +183,36 @@ def test_what_does_not_fit_this_host_is_refused_before_wheels_are_copied(tmp_pat
     folder = lamp(tmp_path / "drive", requires='python = ">=3.99"')
     assert code(copy, folder, tmp_path) == "PYTHON_VERSION"
     assert not (tmp_path / "staging/wheels").exists()
+
+
+def model(drive: Path, size: int) -> Path:
+    """A drive with data of a size, of which the disk has nothing: they are all zeros."""
+    drive.mkdir(parents=True, exist_ok=True)
+    (drive / "weights.gguf").touch()
+    brought = [drive / "weights.gguf"]
+    folder = data_payload.write(drive, PAYLOAD, brought, name="weights", kind="gguf")
+    os.truncate(folder / "data/weights/weights.gguf", size)
+    contents = (folder / "CONTENTS").read_text()
+    path = "  data/weights/weights.gguf\n"
+    (folder / "CONTENTS").write_text(contents.replace(f"  0{path}", f"  {size}{path}"))
+    return folder
+
+
+def test_data_that_do_not_fit_the_disk_are_refused_before_they_are_copied(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = model(tmp_path / "drive", 5 * 1024**3)
+    real = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: real._replace(free=5119 * 2**20))
+    with pytest.raises(PayloadRefused) as refused:
+        copy(folder, tmp_path)
+    (problem,) = refused.value.problems
+    assert (problem.code, problem.need, problem.have) == ("DISK_FULL", "5120 MB", "5119 MB")
+    assert not (tmp_path / "staging/data").exists()
+
+
+def test_data_are_copied_as_they_are_listed_or_not_at_all(tmp_path: Path) -> None:
+    assert code(copy, model(tmp_path / "drive", 1000), tmp_path) == "HASH_MISMATCH"
 
 
 def test_devices_that_the_manifest_does_not_ask_for_are_refused(tmp_path: Path) -> None:
