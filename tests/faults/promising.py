@@ -32,6 +32,7 @@ from nondum.host.peers.trust_store import CERTIFICATE_NAME, KEY_NAME, TRUST_NAME
 from nondum.host.trust import anchors, chain
 from nondum.transport.peers import HostKeys, fleet_files
 from nondum.transport.peers.certificate import issue, new_fleet
+from nondum.wheelhouse.build import data_payload
 from nondum.wheelhouse.store.store import Store
 from nondum.wheelhouse.store.stored import MANIFEST
 from nondum.wheelhouse.trust import owners_folder, trust_text
@@ -131,6 +132,7 @@ def install(folders: Folders, elsewhere: Path) -> None:
         promise(Kind.WHOLE, stored.folder)
     _install(folders, elsewhere, "known", "store")
     _restore(folders, elsewhere, "restored")
+    _install_data(folders, elsewhere, "data")
     first = store.listing()[0]
     store.compile(first.sha256)
     promise(Kind.SAFE, first.folder)
@@ -149,8 +151,24 @@ def _restore(folders: Folders, elsewhere: Path, key: str) -> None:
     promise(Kind.SAFE, kept)
 
 
+def _install_data(folders: Folders, elsewhere: Path, key: str) -> None:
+    file = elsewhere / "weights.gguf"
+    file.write_bytes(b"weights")
+    drive = elsewhere / key / "drive"
+    made = data_payload.write(drive, "org.example.d", [file], name="weights", kind="gguf")
+    _install_from(folders, elsewhere, key, "store", made)
+    brought = folders.payloads / key / "data/weights"
+    for path in (brought.parent, brought, brought / "weights.gguf", folders.root / "data"):
+        promise(Kind.SAFE, path)
+    promise(Kind.SAFE, folders.root / "data" / sha256(file))
+
+
 def _install(folders: Folders, elsewhere: Path, key: str, method: str) -> None:
-    staged = shutil.copytree(lamp(elsewhere / key / "drive"), folders.root / "staging" / key)
+    _install_from(folders, elsewhere, key, method, lamp(elsewhere / key / "drive"))
+
+
+def _install_from(folders: Folders, elsewhere: Path, key: str, method: str, payload: Path) -> None:
+    staged = shutil.copytree(payload, folders.root / "staging" / key)
     kept = folders.payloads / key
     state_folders.move(staged, kept)
     arguments: dict[str, Any] = {
