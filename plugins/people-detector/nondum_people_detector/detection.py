@@ -24,12 +24,15 @@ class Detector(Protocol):
         """Things in a grey or blue-green-red image of 8 bits, best first."""
 
 
-def detector(settings: Settings) -> Detector:
-    """The detector that the settings ask for. Raises `ConfigRefused` (WEIGHTS_UNREADABLE)."""
+def detector(settings: Settings, weights: Path | None) -> Detector:
+    """The detector that the weights are of, if there are any; by HOG without.
+
+    Raises `ConfigRefused` (WEIGHTS_UNREADABLE).
+    """
     cv2.setNumThreads(settings.threads)
-    if settings.weights:
+    if weights is not None:
         return NetworkDetector(
-            Path(settings.weights),
+            weights,
             size=settings.weights_size,
             layout=settings.weights_layout,
             number=settings.weights_class,

@@ -40,7 +40,7 @@ class NetworkDetector:
         try:
             self._network: Any = cv2.dnn.readNetFromONNX(str(weights))
         except cv2.error as error:
-            fix = "export the network to ONNX with one output, and name the file in `weights`"
+            fix = "export the network to ONNX with one output, and put that on the drive"
             raise ConfigRefused(
                 Problem("WEIGHTS_UNREADABLE", str(error), where=str(weights), fix=fix)
             ) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from nondum.sdk import Context, Fragment, Label, Output, Unit, behaviour, hookimpl
+from nondum.sdk import Context, Fragment, Label, Output, ThreadContext, Unit, behaviour, hookimpl
 from nondum.sdk.settings import parse_settings
 from nondum_people_detector.detection import detect, detector
 from nondum_people_detector.settings import Settings
@@ -32,9 +32,9 @@ def labels() -> tuple[Label, ...]:
 
 
 @hookimpl
-async def start(ctx: Context) -> None:
-    """Refuse wrong settings, and weights that cannot be read, before anybody plans with them."""
-    await asyncio.to_thread(detector, parse_settings(Settings, ctx.settings, where=ctx.component))
+def start(ctx: ThreadContext) -> None:
+    """Refuse wrong settings before anybody plans with them."""
+    parse_settings(Settings, ctx.settings, where=ctx.component)
 
 
 @behaviour(
@@ -43,14 +43,20 @@ async def start(ctx: Context) -> None:
     lasting=True,
 )
 async def detect_people(ctx: Context, u: str, i: str, o: str, h: str, c: str) -> None:
-    """Find people in the newest image, over and over, until halted."""
+    """Find people in the newest image, over and over, until halted; by other weights from the image
+    on before which those are shown.
+
+    Fails with WEIGHTS_UNREADABLE.
+    """
     settings = parse_settings(Settings, ctx.settings, where=ctx.component)
-    finder = await asyncio.to_thread(detector, settings)
+    weights = ctx.data("weights")
+    finder = await asyncio.to_thread(detector, settings, weights.path if weights else None)
     output, is_established = ctx.output(o), False
     async for image in ctx.input(i):
-        found = await asyncio.to_thread(
-            detect, finder, image, is_probability=bool(settings.weights)
-        )
+        if (shown := ctx.data("weights")) != weights:
+            weights = shown
+            finder = await asyncio.to_thread(detector, settings, weights.path if weights else None)
+        found = await asyncio.to_thread(detect, finder, image, is_probability=weights is not None)
         output.send(found)
         if not is_established:
             await ctx.established()

@@ -9,7 +9,8 @@ from nondum_people_detector.network import Layout
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Without `weights` people are found by HOG, with them by the network."""
+    """People are found by HOG where no weights are shown, otherwise by the network that they are
+    of."""
 
     threshold: float = 0.3
     """How sure is sure enough: distance from the SVM's plane (HOG), or the network's score."""
@@ -21,8 +22,6 @@ class Settings:
     """Boxes that overlap more (intersection over union) mean the same person."""
     threads: int = 2
     """Threads that OpenCV may use."""
-    weights: str = ""
-    """Path of an ONNX file."""
     weights_size: int = 640
     """Side of its square input in pixels."""
     weights_layout: Layout = "v8"

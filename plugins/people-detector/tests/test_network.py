@@ -14,7 +14,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from nondum.sdk import ConfigRefused
+from nondum.sdk import ConfigRefused, Header, Image
 from nondum_people_detector.network import Layout, NetworkDetector
 
 SIDE = 64
@@ -107,3 +107,31 @@ def test_file_that_is_no_network_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"no network")
     with pytest.raises(ConfigRefused, match="WEIGHTS_UNREADABLE"):
         NetworkDetector(path, size=SIDE, layout="v8", number=0, threshold=0.5, overlap=0.5)
+
+
+def seen_by(bench: Any, picture: np.ndarray[Any, np.dtype[np.uint8]]) -> int:
+    """How many people are seen in a picture that is fed now."""
+    bench.drain("people")
+    header = Header(stamp_s=1.0, frame_id="robot__cam__camera", seq=1)
+    bench.feed(Image.from_array(header, picture, "bgr8"), stream="images")
+    return len(bench.read("people").detections)
+
+
+def test_weights_come_and_go_while_it_detects(worker: Any, tmp_path: Path) -> None:
+    settings = {"weights_size": SIDE, "weights_class": 1}
+    bench = worker("nondum_people_detector.plugin", settings=settings)
+    call = bench.behave("detect", u="detector", i="images", o="people", h=bench.host, c="person")
+    bright = image(255, 255)  # no person by their shape
+    assert seen_by(bench, bright) == 0
+    bench.show("weights", tiny_network(tmp_path / "tiny.onnx", "v8"))
+    assert seen_by(bench, bright) == 2
+    bench.hide("weights")
+    assert seen_by(bench, bright) == 0
+    assert call.halt().state == "halted"
+
+
+def test_weights_that_are_no_network_fail_the_behaviour(worker: Any, tmp_path: Path) -> None:
+    (tmp_path / "x.onnx").write_bytes(b"no network")
+    bench = worker("nondum_people_detector.plugin", data={"weights": tmp_path / "x.onnx"})
+    call = bench.behave("detect", u="detector", i="images", o="people", h=bench.host, c="person")
+    call.assert_failed("WEIGHTS_UNREADABLE")

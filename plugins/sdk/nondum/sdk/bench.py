@@ -257,6 +257,14 @@ class Bench:
         nodes = [first, *({"node": path, "properties": dict(more)} for path, more in others)]
         self.ask("attach", device=device, nodes=nodes, **first)
 
+    def show(self, name: str, path: Path) -> None:
+        """Show data for a declared need: a file, or a folder of files."""
+        self.ask("data", need=name, shown=_shown(name, path))
+
+    def hide(self, name: str) -> None:
+        """Show no data for a need any more."""
+        self.ask("data", need=name, shown=None)
+
     def detach(self, device: str) -> None:
         """Take a device away."""
         self.ask("detach", device=device)
