@@ -103,7 +103,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
         f"{_TW}/test_goal_payload.py",
         f"{_TW}/test_data_payload.py",
     ),
-    f"{_W}/build/verification.py": (f"{_TW}/test_verification.py",),
+    f"{_W}/build/verification.py": (f"{_TW}/test_verification.py", f"{_TW}/test_data_payload.py"),
     f"{_W}/payload/preflight.py": (
         f"{_TW}/test_preflight.py",
         f"{_TW}/test_limits.py",

@@ -190,6 +190,18 @@ def test_a_drive_that_cannot_take_it_is_told_and_keeps_what_it_had(
     assert [path.name for path in folder.parent.iterdir()] == [folder.name]
 
 
+def test_data_that_are_not_as_listed_are_told_and_copied_nowhere(
+    tmp_path: Path, model: Path
+) -> None:
+    folder = write(tmp_path / "drive", model)
+    (folder / "data/yolo/yolo.onnx").write_bytes(bytes(1280000))
+    listed = contents.parse(drive.read_contents(folder), "CONTENTS")
+    with pytest.raises(PayloadRefused) as refused:
+        drive.check(folder, listed)
+    assert [p.code for p in refused.value.problems] == ["HASH_MISMATCH"]
+    assert [p.code for p in verify(folder, UnsignedAllowed()).problems] == ["HASH_MISMATCH"]
+
+
 def test_listed_data_that_the_manifest_does_not_name_are_refused(tmp_path: Path) -> None:
     folder = make_payload(tmp_path / "drive", Part("blinker", "X = 1\n", with_sdk=False))
     (folder / "data/more").mkdir(parents=True)

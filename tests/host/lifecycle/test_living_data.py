@@ -143,6 +143,25 @@ async def test_a_newer_release_is_shown_instead(tmp_path: Path) -> None:
         await until_said(host, "words 1 hello")
 
 
+async def test_a_release_that_takes_over_is_shown_what_the_one_before_was(tmp_path: Path) -> None:
+    reader(tmp_path / "reader")
+    words(tmp_path / "words", "hello")
+    newer = Part("reader", READER.replace("said, code", 'f"2: {said}", code'), manifest=NEEDS)
+    make_payload(tmp_path / "newer", newer, payload_id=READER_ID, release=2)
+    async with host_in_process(tmp_path) as host:
+        for name in ("words", "reader"):
+            host.plug(tmp_path / name, name)
+        await host.until(lambda: is_ready(host))
+        await until_said(host, "words 1 hello")
+        host.plug(tmp_path / "newer", "newer")
+        await host.until_releases(READER_ID, r1=Step.SUPERSEDED, r2=Step.ACTIVE)
+        await until_said(host, "2: words 1 hello")
+        host.pull("newer")
+        await host.until_releases(READER_ID, r1=Step.ACTIVE, r2=None)
+        assert is_ready(host)
+        await until_said(host, "words 1 hello")
+
+
 async def test_a_worker_that_crashed_is_shown_the_same_again(tmp_path: Path) -> None:
     reader(tmp_path / "reader")
     words(tmp_path / "words", "hello")

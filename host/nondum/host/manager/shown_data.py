@@ -47,12 +47,12 @@ class ShownData:
             "folder": str(folder),
             "files": list(data.files),
         }
-        await self._workers.show(effect.component, effect.need, told)
+        await self._workers.show(effect.component, effect.payload, effect.need, told)
         return ()
 
     async def hide(self, effect: effects.HideData) -> tuple[Event, ...]:
         """Tell the component's worker, and take the data away."""
-        await self._workers.show(effect.component, effect.need, None)
+        await self._workers.show(effect.component, effect.payload, effect.need, None)
         folder = self._folders.shown(effect.payload, effect.component) / effect.need
         await in_thread(remove, folder)
         return ()

@@ -72,8 +72,8 @@ class Workers:
         self._supervisors: dict[str, Supervisor] = {}
         self._extra_workers = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
-        self._shown: dict[str, dict[str, Mapping[str, Any]]] = {}
-        """Component → need → the data that it is shown for it."""
+        self._shown: dict[tuple[str, str], dict[str, Mapping[str, Any]]] = {}
+        """Component and payload → need → the data that it is shown for it."""
         self._mounts: Mapping[str, Any] = {}
         core_value_types()  # read now: a worker may be started when there is little memory
         self._call_ids = itertools.count(1)
@@ -130,7 +130,6 @@ class Workers:
             if old is not None:
                 old.withdraw()
                 self._extra_workers.add(old, self._devices.pop(component, {}))
-                self._shown.pop(component, None)
             self._extra_workers.drop(new)
             self._supervisors[component] = new
             new.come_into_force()
@@ -165,7 +164,7 @@ class Workers:
             return
         if supervisor.role is Role.ACTIVE:
             self._extra_workers.add(supervisor, self._devices.pop(component, {}))
-            self._shown.pop(component, None)
+        self._shown.pop((component, supervisor.spec.payload), None)
         try:
             await supervisor.stop(grace_s)
         finally:
@@ -260,16 +259,20 @@ class Workers:
         self._devices.get(component, {}).pop(need, None)
         await self._tell_worker(component, lambda worker: worker.detach(need))
 
-    async def show(self, component: str, need: str, data: Mapping[str, Any] | None) -> None:
-        """Tell a component's worker, and those after it, which data it is shown for a need; None:
-        none any more."""
-        shown = self._shown.setdefault(component, {})
+    async def show(
+        self, component: str, payload: str, need: str, data: Mapping[str, Any] | None
+    ) -> None:
+        """Tell the worker that a payload has for a component, and those after it, which data it is
+        shown for a need; None: none any more."""
+        shown = self._shown.setdefault((component, payload), {})
         if data is None:
             shown.pop(need, None)
         else:
             shown[need] = data
-        body = {"need": need, "shown": data}
-        await self._tell_worker(component, lambda worker: worker.link.request("data", body))
+        supervisor = self._supervisors.get(component)
+        if supervisor is not None and supervisor.spec.payload == payload:
+            body = {"need": need, "shown": data}
+            await self._tell_worker(component, lambda worker: worker.link.request("data", body))
 
     def claims(self, component: str) -> tuple[FactKnown | StreamFlowing, ...]:
         """What a component's worker says is so now: the news of it that still hold.
@@ -346,7 +349,7 @@ class Workers:
             "settings": spec.settings,
             "scratch": str(spec.scratch),
             "devices": self._devices.get(spec.component, {}),
-            "data": self._shown.get(spec.component, {}),
+            "data": self._shown.get((spec.component, spec.payload), {}),
             "mounts": self._mounts,
             "limits": {"memory_mb": spec.limits.memory_mb, "tasks": spec.limits.tasks},
         }

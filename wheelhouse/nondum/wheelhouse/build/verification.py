@@ -80,7 +80,10 @@ def _verified(
         if not found:
             with tempfile.TemporaryDirectory(prefix="nondum-verify-") as staging:
                 copied = Path(staging) / "payload"
-                drive.copy(folder, listed, copied, progress)
+                drive.copy(
+                    folder, listed, copied, progress, lambda entry: not payload.is_data(entry.path)
+                )
+                drive.check(folder, listed, progress, lambda entry: payload.is_data(entry.path))
                 staged = _loaded(copied, listed, problems)
                 problems.extend(_found(copied, staged, verdict, facts))
     except NondumError as error:

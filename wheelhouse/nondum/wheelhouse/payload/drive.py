@@ -116,11 +116,32 @@ def copy(
     raised: `PayloadRefused` (FILE_MISSING, HASH_MISMATCH, PATH_UNSAFE) with every file that is
     wrong, `DriveGone`, `InstallFailed` (DISK_FULL, IO_ERROR).
     """
+    staging.mkdir(parents=True, exist_ok=True)
+    return _read(folder, listed, staging, progress, wanted)
+
+
+def check(
+    folder: Path,
+    listed: Contents,
+    progress: Progress | None = None,
+    wanted: Callable[[Entry], bool] = lambda entry: True,
+) -> int:
+    """Hash the wanted listed files and keep nothing of them; returns bytes read. Raises as `copy`,
+    but for `InstallFailed`."""
+    return _read(folder, listed, None, progress, wanted)
+
+
+def _read(
+    folder: Path,
+    listed: Contents,
+    staging: Path | None,
+    progress: Progress | None,
+    wanted: Callable[[Entry], bool],
+) -> int:
     entries = [entry for entry in listed.entries if wanted(entry)]
     total = sum(entry.size for entry in entries)
     problems: list[Problem] = []
     done = 0
-    staging.mkdir(parents=True, exist_ok=True)
 
     def copied(size: int) -> None:
         nonlocal done
@@ -130,7 +151,8 @@ def copy(
 
     with _folder(folder) as source:
         for entry in entries:
-            problem = _copy(source, folder, entry, staging / entry.path, copied)
+            target = staging / entry.path if staging is not None else None
+            problem = _copy(source, folder, entry, target, copied)
             if problem is not None:
                 problems.append(problem)
     if problems:
@@ -139,7 +161,7 @@ def copy(
 
 
 def _copy(
-    source: int, folder: Path, entry: Entry, target: Path, copied: Callable[[int], None]
+    source: int, folder: Path, entry: Entry, target: Path | None, copied: Callable[[int], None]
 ) -> Problem | None:
     where = f"{folder.name}/{entry.path}"
     try:
@@ -151,7 +173,6 @@ def _copy(
     except OSError as error:
         raise _gone(folder, error) from error
     try:
-        _make_folder(target.parent)
         digest, size = _copy_bytes(descriptor, entry, target, folder, copied)
     finally:
         os.close(descriptor)
@@ -168,10 +189,18 @@ def _copy(
 
 
 def _copy_bytes(
-    descriptor: int, entry: Entry, target: Path, folder: Path, copied: Callable[[int], None]
+    descriptor: int, entry: Entry, target: Path | None, folder: Path, copied: Callable[[int], None]
 ) -> tuple[str, int]:
-    """Digest and size of what was read; at most one byte more than listed."""
+    """Digest and size of what was read; at most one byte more than listed. Without a target, none
+    of it is written."""
     digest, size = hashlib.sha256(), 0
+    if target is None:
+        for piece in _pieces(descriptor, entry.size + 1, folder):
+            digest.update(piece)
+            size += len(piece)
+            copied(len(piece))
+        return digest.hexdigest(), size
+    _make_folder(target.parent)
     try:
         # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
         with target.open("xb") as out:
