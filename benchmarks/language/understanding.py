@@ -13,6 +13,7 @@ from benchmarks.language import corpus
 from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.goal import Goal, parse_goal
 from nondum.planning.merge.merge import merge
+from nondum.planning.pddl.normal import Condition
 from nondum.planning.words.pattern import words_of
 from nondum.planning.words.phrases import Phrasebook, phrasebook
 from nondum.sdk.description import PluginDescription
@@ -45,7 +46,7 @@ class Robot:
     """What can be said to a robot with the shipped payloads, and its goals by their letters."""
 
     book: Phrasebook
-    letters: Mapping[tuple[object, ...], str]
+    letters: Mapping[tuple[Condition, str], str]
 
     def letter(self, goal: Goal) -> str:
         """The letter of a goal; "?" for one that is not listed."""
@@ -101,7 +102,7 @@ class WordOverlap:
         ]
 
     def meaning(self, sentence: str) -> str:
-        """The goal of the nearest, by words in common among all words; "" where that is not near."""
+        """The goal of the nearest, by words in common among all, if that is near."""
         said = frozenset(words_of(sentence))
         nearest = max(
             (len(said & words) / len(said | words), letter) for words, letter in self._offers

@@ -74,9 +74,7 @@ def test_answers_are_judged_by_goals(meant: str, understood: str, score: Score) 
     assert scored(Fixed(understood), [Sentence("any", "any", meant)] * 2) == score + score
 
 
-def test_declared_phrases_are_understood_and_nothing_is_taken_for_a_goal_that_is_not_listed() -> (
-    None
-):
+def test_declared_phrases_are_understood_and_no_goal_is_meant_that_is_not_listed() -> None:
     rung = Declared(robot())
     declared = [sentence for sentence in SENTENCES if sentence.group == "declared"]
     assert scored(rung, declared) == Score(right=len(declared))
