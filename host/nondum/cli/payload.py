@@ -13,6 +13,7 @@ from nondum.cli import complete, render
 from nondum.cli.connection import json_option
 from nondum.cli.judge import FOLDER, KEY, inspect, loaded_payload, payloads, size_of
 from nondum.cli.payload_data import data
+from nondum.cli.payload_options import Destination, written
 from nondum.cli.progress import ProgressLine
 from nondum.cli.session import Session
 from nondum.cli.verify import check, verify
@@ -62,13 +63,7 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
 
 @payload.command()
 @click.argument("packages", metavar="PKG…", nargs=-1, required=True, type=FOLDER)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path, file_okay=False),
-    help="The drive: any folder.",
-)
+@written
 @click.option("--arch", "architectures", multiple=True, help="x86_64, aarch64 [default: this].")
 @click.option("--python", "pythons", multiple=True, help="3.11 … [default: 3.11, 3.12, 3.13].")
 @click.option(
@@ -80,26 +75,18 @@ def new(session: Session, name: str, output: Path | None, payload_id: str | None
 )
 @click.option("--wheels", "wheels", multiple=True, type=FOLDER, help="Folder of wheels to use.")
 @click.option("--offline", is_flag=True, help="Use those folders only, no index.")
-@click.option("--release", type=int, help="Number that orders releases [default: the time].")
-@click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
-@click.option("--host", "hosts", multiple=True, help="The only hosts it is for [default: any].")
-@click.option("--sign", "keys", multiple=True, type=KEY, help="Key to sign it with.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress.")
 @json_option
 @click.pass_obj
 def build(
     session: Session,
     packages: tuple[Path, ...],
-    output: Path,
+    to: Destination,
     architectures: tuple[str, ...],
     pythons: tuple[str, ...],
     libraries: tuple[Path, ...],
     wheels: tuple[Path, ...],
     offline: bool,
-    release: int | None,
-    fleet: str,
-    hosts: tuple[str, ...],
-    keys: tuple[Path, ...],
     quiet: bool,
 ) -> None:
     """Build one payload a package, with wheels for every architecture and Python. A wheel that
@@ -115,23 +102,22 @@ def build(
     from nondum.wheelhouse.build import cost
     from nondum.wheelhouse.build.resolve import Sources
     from nondum.wheelhouse.format.target import PYTHONS, Target, targets
-    from nondum.wheelhouse.trust import owners_folder
 
     options = building.Options(
         targets=targets(architectures or (Target.here().architecture,), pythons or PYTHONS),
         sources=Sources(wheels, offline),
         libraries=libraries,
-        release=release,
-        fleet=fleet,
-        hosts=hosts,
+        release=to.release,
+        fleet=to.fleet,
+        hosts=to.hosts,
         judge=lambda index: vocabulary_check.judge(index).problems,
-        finish=lambda folder: [owners_folder.sign_payload(folder, key) for key in keys],
+        finish=to.sign,
     )
-    made, before = [], _versions(output)
+    made, before = [], _versions(to.output)
     for package in packages:
         is_wanted = not (quiet or session.as_json)
         with ProgressLine(package.resolve().name, is_wanted=is_wanted) as show:
-            made.append(building.build(package, output, options, show))
+            made.append(building.build(package, to.output, options, show))
     found = {folder: cost.costs(loaded_payload(folder), options.targets) for folder in made}
     if session.as_json:
         rows = {str(folder): list(map(costs.row, told)) for folder, told in found.items()}
@@ -146,29 +132,15 @@ def build(
 
 @payload.command()
 @click.argument("words", metavar="WORDS…", nargs=-1, required=True)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path, file_okay=False),
-    help="The drive: any folder.",
-)
+@written
 @click.option("--id", "payload_id", default="org.example.goal", help="The payload's id.")
-@click.option("--release", type=int, help="Number that orders releases [default: the time].")
-@click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
-@click.option("--host", "hosts", multiple=True, help="The only hosts it is for [default: any].")
-@click.option("--sign", "keys", multiple=True, type=KEY, help="Key to sign it with.")
 @json_option
 @click.pass_obj
 def goal(
     session: Session,
     words: tuple[str, ...],
-    output: Path,
+    to: Destination,
     payload_id: str,
-    release: int | None,
-    fleet: str,
-    hosts: tuple[str, ...],
-    keys: tuple[Path, ...],
 ) -> None:
     """Put goals on a drive, in words: a robot wants them while it is plugged in.
 
@@ -180,11 +152,11 @@ def goal(
               nondum payload goal "search for people" "come back" -o drive --id com.acme.search
     """
     from nondum.wheelhouse.build import goal_payload
-    from nondum.wheelhouse.trust import owners_folder
 
-    made = goal_payload.write(output, payload_id, words, release=release, fleet=fleet, hosts=hosts)
-    for key in keys:
-        owners_folder.sign_payload(made, key)
+    made = goal_payload.write(
+        to.output, payload_id, words, release=to.release, fleet=to.fleet, hosts=to.hosts
+    )
+    to.sign(made)
     if session.as_json:
         render.as_json({"payloads": [str(made)]})
     else:

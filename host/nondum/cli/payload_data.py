@@ -8,7 +8,8 @@ import click
 
 from nondum.cli import render
 from nondum.cli.connection import json_option
-from nondum.cli.judge import KEY, size_of
+from nondum.cli.judge import size_of
+from nondum.cli.payload_options import Destination, written
 from nondum.cli.progress import ProgressLine
 from nondum.cli.session import Session
 
@@ -17,35 +18,21 @@ from nondum.cli.session import Session
 @click.argument(
     "files", metavar="FILE…", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path)
 )
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path, file_okay=False),
-    help="The drive: any folder.",
-)
+@written
 @click.option("--kind", required=True, help="What it is for: components ask for data by kind.")
 @click.option("--name", help="What it is called [default: as its first file].")
 @click.option("--version", default="1", show_default=True, help="Its version (PEP 440).")
 @click.option("--id", "payload_id", help="The payload's id [default: org.example.NAME].")
-@click.option("--release", type=int, help="Number that orders releases [default: the time].")
-@click.option("--fleet", default="", help="Robots that it is meant for [default: any].")
-@click.option("--host", "hosts", multiple=True, help="The only hosts it is for [default: any].")
-@click.option("--sign", "keys", multiple=True, type=KEY, help="Key to sign it with.")
 @json_option
 @click.pass_obj
 def data(
     session: Session,
     files: tuple[Path, ...],
-    output: Path,
+    to: Destination,
     kind: str,
     name: str | None,
     version: str,
     payload_id: str | None,
-    release: int | None,
-    fleet: str,
-    hosts: tuple[str, ...],
-    keys: tuple[Path, ...],
 ) -> None:
     """Put a model, a map or other data on a drive, for components that ask for such.
 
@@ -57,22 +44,21 @@ def data(
               nondum payload data maps/ --kind floor-plan --name hall --version 3 -o drive
     """
     from nondum.wheelhouse.build import data_payload
-    from nondum.wheelhouse.trust import owners_folder
 
     called = name or data_payload.name_of(files[0])
     with ProgressLine(called, is_wanted=not session.as_json) as show:
         made = data_payload.write(
-            output,
+            to.output,
             payload_id or f"org.example.{called}",
             files,
             name=called,
             kind=kind,
             version=version,
-            release=release,
-            fleet=fleet,
-            hosts=hosts,
+            release=to.release,
+            fleet=to.fleet,
+            hosts=to.hosts,
             progress=show,
-            finish=lambda folder: [owners_folder.sign_payload(folder, key) for key in keys],
+            finish=to.sign,
         )
     if session.as_json:
         render.as_json({"payloads": [str(made)]})

@@ -83,6 +83,23 @@ async def test_known_payload_is_not_copied_again(tmp_path: Path) -> None:
         assert copied[1]["bytes_known"] == copied[0]["bytes_copied"]
 
 
+async def test_what_can_wait_does_not_pile_up_while_drives_come_and_go(tmp_path: Path) -> None:
+    folder = make_payload(tmp_path / "drive", Part("lamp", LAMP), requires='python = ">=9"')
+    async with host_in_process(tmp_path) as host:
+
+        async def come_and_go() -> None:
+            host.plug(tmp_path / "drive")
+            await host.until_step(folder.name, Step.REFUSED)
+            host.pull()
+            await host.until_gone(folder.name)
+
+        await come_and_go()
+        before = len(asyncio.all_tasks())
+        for _ in range(10):
+            await come_and_go()
+        assert len(asyncio.all_tasks()) <= before + 1
+
+
 async def test_two_payloads_on_one_drive_are_two(tmp_path: Path) -> None:
     lamp(tmp_path / "drive")
     lamp(tmp_path / "drive", "torch", "org.example.torch")

@@ -41,10 +41,7 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     staged = look.load_staged(folder)
     grant = chain.grant_of_kept(arguments, folder, staged.manifest, staged.goals)
     facts = look.facts_of(arguments)
-    requires = staged.manifest.requires
-    if arguments["headroom"] is not None:
-        have = look.memory_for(arguments, facts)
-        look.refuse_if_any(tuple(memory.problems(requires, have, staged.manifest.id)))
+    _refuse_without_memory(arguments, staged, facts)
     root.mkdir(parents=True, exist_ok=True)
     _keep_data(arguments, staged)
     with ThreadPoolExecutor(1) as pool:  # disks take their time; what is linked is not waited for
@@ -58,22 +55,31 @@ def install(arguments: Arguments, report: Report) -> dict[str, Any]:
     if not by_pip:
         shutil.rmtree(folder / "wheels", ignore_errors=True)  # the store has them now
     components = [_told(staged, component, root) for component in staged.manifest.components]
-    needs = {
-        "payload_id": staged.manifest.id,
-        "memory_mb": requires.memory_mb,
-        "gpu_memory_mb": requires.gpu_memory_mb,
-        "alone": requires.alone,
-    }
-    gpu = facts.memory.gpu
     return {
         "fresh": fresh,
         "uncompiled": uncompiled,
         "components": components,
-        "needs": needs,
-        "gpu": to_plain(gpu),
+        "needs": _needs(staged),
+        "gpu": to_plain(facts.memory.gpu),
         "grant": grant.to_dict(),
         "goals": list(staged.goals),
         "data": [_told_data(staged, brought) for brought in staged.manifest.data],
+    }
+
+
+def _refuse_without_memory(arguments: Arguments, staged: StagedPayload, facts: HostFacts) -> None:
+    if arguments["headroom"] is not None:
+        have, said = look.memory_for(arguments, facts), staged.manifest
+        look.refuse_if_any(tuple(memory.problems(said.requires, have, said.id)))
+
+
+def _needs(staged: StagedPayload) -> dict[str, Any]:
+    requires = staged.manifest.requires
+    return {
+        "payload_id": staged.manifest.id,
+        "memory_mb": requires.memory_mb,
+        "gpu_memory_mb": requires.gpu_memory_mb,
+        "alone": requires.alone,
     }
 
 

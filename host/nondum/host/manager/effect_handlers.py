@@ -67,7 +67,7 @@ class Executor:
         )
         self._queues = KeyedQueues()
         self._quiet = IdleScheduler()
-        self._is_prune_waiting = False
+        self._is_prune_waiting = self._is_fill_waiting = False
         self._drives = DriveReading(self.children, emit, self.trust, options.look_s)
         self.installation = Installation(
             host, folders, workers, self.children, emit, options, self.trust
@@ -154,9 +154,14 @@ class Executor:
 
     async def _cache(self, effect: effects.CachePayload) -> tuple[Event, ...]:
         told = await self.installation.cache(effect)
-        fill = partial(self.installation.fill_cache, effect.payload)
-        self._queues.add("cache", partial(self._quiet.run, fill))
+        if not self._is_fill_waiting:  # one that is to come serves all that are cached till then
+            self._is_fill_waiting = True
+            self._queues.add("cache", partial(self._quiet.run, self._fill_cache))
         return told
+
+    async def _fill_cache(self) -> None:
+        await self.installation.fill_cache()
+        self._is_fill_waiting = False
 
     def _want_prune(self) -> None:
         """Have the store pruned; one that is to come serves all who have asked till then."""

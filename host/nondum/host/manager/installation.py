@@ -265,11 +265,12 @@ class Installation:
                 log.info("%s is not cached: %s", key, error)
         return await self.clear(effect)
 
-    async def fill_cache(self, key: str) -> None:
-        """Make the venvs of a payload that was withdrawn, if it is still away."""
-        async with self._store:
-            if await self._cache.fill(key, self._arguments(python=str(base_interpreter()))):
-                self._emit(PayloadCached(key))
+    async def fill_cache(self) -> None:
+        """Make the venvs of payloads that were withdrawn and are still away."""
+        while (key := self._cache.unfilled) is not None:
+            async with self._store:
+                if await self._cache.fill(key, self._arguments(python=str(base_interpreter()))):
+                    self._emit(PayloadCached(key))
 
     async def prune(self) -> None:
         """Bring the store down to its quota; what is cached goes first."""

@@ -54,6 +54,11 @@ class PayloadCache:
     def __contains__(self, key: str) -> bool:
         return key in self._cached
 
+    @property
+    def unfilled(self) -> str | None:
+        """A payload whose venvs are not made yet; None: there is none."""
+        return next((key for key, cached in self._cached.items() if not cached.stamp), None)
+
     def put(self, key: str, told: Mapping[str, Any]) -> None:
         """Take a payload's checked files. Blocks.
 
