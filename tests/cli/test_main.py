@@ -49,6 +49,7 @@ Commands:
   completion  Print the script that completes commands in a shell.
   components  What the robot is made of at this moment.
   config      Check, show and explain the configuration, without a daemon.
+  data        Models, maps and other data that are here, and which components are shown them.
   devices     What is plugged in, and who has it.
   doctor      Look for what is wrong around this host, without a daemon.
   explain     Say what a code means, where it comes from, and what to do.
@@ -71,7 +72,7 @@ Commands:
   say         Say something to the robot, as if it had heard it.
   status      The host, its payloads and its goals at a glance.
   stop        Stop this host and its peers at once.
-  store       The wheels that this host keeps.
+  store       The wheels and data that this host keeps.
   streams     The streams: their producers, readers and messages.
   tree        The behaviour tree as it is being ticked, and why.
   units       What the robot has to act with.
