@@ -49,7 +49,7 @@ Commands:
   completion  Print the script that completes commands in a shell.
   components  What the robot is made of at this moment.
   config      Check, show and explain the configuration, without a daemon.
-  data        Models, maps and other data that are here, and which components are shown them.
+  data        Models, maps and other data that are here, and which components see them.
   devices     What is plugged in, and who has it.
   doctor      Look for what is wrong around this host, without a daemon.
   explain     Say what a code means, where it comes from, and what to do.

@@ -119,7 +119,7 @@ def store(session: Session) -> None:
 @json_option
 @click.pass_obj
 def data(session: Session) -> None:
-    """Models, maps and other data that are here, and which components are shown them.
+    """Models, maps and other data that are here, and which components see them.
 
     Example: nondum data
     """

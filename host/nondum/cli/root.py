@@ -29,7 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "completion": ("shell", "Print the script that completes commands in a shell."),
     "components": ("body", "What the robot is made of at this moment."),
     "config": ("config", "Check, show and explain the configuration, without a daemon."),
-    "data": ("body", "Models, maps and other data that are here, and which components are shown them."),
+    "data": ("body", "Models, maps and other data that are here, and which components see them."),
     "devices": ("devices", "What is plugged in, and who has it."),
     "doctor": ("doctor", "Look for what is wrong around this host, without a daemon."),
     "explain": ("explain", "Say what a code means, where it comes from, and what to do."),
