@@ -33,6 +33,8 @@ from nondum.wheelhouse.wheels import wheel
 MINIMUM_NONDUM = "0.1"
 """The oldest nondum that reads what is written here."""
 _PIECE = 4 * 1024 * 1024
+_FINE = 100
+"""What is told of one step's parts."""
 PROCESSES = 4
 """pips at once: they wait for the index most of the time."""
 
@@ -61,22 +63,22 @@ class Options:
 def build(package: Path, drive: Path, options: Options, progress: Progress) -> Path:
     """Build one payload folder on a drive and return it; replaces one of the same id.
 
-    `progress` gets what is being done, and steps done of all. Raises `PayloadRefused`,
+    `progress` gets what is being done, and how far all of it is. Raises `PayloadRefused`,
     `InstallFailed`; nothing is left on the drive then.
     """
     said = source.manifest_of(package)
     with tempfile.TemporaryDirectory(prefix="nondum-build-") as temporary:
         work = Path(temporary)
-        steps = 4 + len(options.targets)
-        progress("making the wheels of the sources", 0, steps)
+        steps = _Steps(progress, 4 + len(options.targets))
+        steps.at("making the wheels of the sources", 0)
         own, *libraries = _made(package, work / "made", options)
         folders = (*(path.parent for path in libraries), *options.sources.wheel_folders)
         sources = replace(options.sources, wheel_folders=folders)
-        chosen = _fetched(own, work, options, sources, progress)
-        progress("asking the plugin what it is", steps - 3, steps)
+        chosen = _fetched(own, work, options, sources, steps)
+        steps.at("asking the plugin what it is", -3)
         described = _described(said, chosen[Target.here()], work / "site-packages")
         wheel.refuse_if_any(source.description_problems(said, described, options.judge))
-        progress("writing the payload", steps - 2, steps)
+        steps.at("writing the payload", -2)
         locked = {target: chosen[target] for target in options.targets}
         folder = work / said.id
         _write(folder, package, said, locked, described)
@@ -84,10 +86,26 @@ def build(package: Path, drive: Path, options: Options, progress: Progress) -> P
         fleet, hosts = options.fleet, options.hosts
         seal(folder, said.id, _version(own), options.release, fleet=fleet, hosts=hosts)
         options.finish(folder)
-        progress("copying it to the drive", steps - 1, steps)
-        target = deliver(folder, drive, progress)
-        progress("done", steps, steps)
+        target = deliver(folder, drive, steps.within_the_last)
+        steps.at("done", steps.count)
         return target
+
+
+class _Steps:
+    """Tells of steps, the last of which is long."""
+
+    def __init__(self, progress: Progress, count: int) -> None:
+        self._progress, self.count = progress, count
+
+    def at(self, what: str, number: int) -> None:
+        """A number of steps is done; below 0: that number is left."""
+        done = number if number >= 0 else self.count + number
+        self._progress(what, done * _FINE, self.count * _FINE)
+
+    def within_the_last(self, what: str, done: int, total: int) -> None:
+        """All are done but the last, and a part of that."""
+        part = _FINE * done // max(total, 1)
+        self._progress(what, (self.count - 1) * _FINE + part, self.count * _FINE)
 
 
 def _made(package: Path, work: Path, options: Options) -> list[Path]:
@@ -113,12 +131,11 @@ def _all_of(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
 
 
 def _fetched(
-    own: Path, work: Path, options: Options, sources: Sources, progress: Progress
+    own: Path, work: Path, options: Options, sources: Sources, steps: _Steps
 ) -> dict[Target, tuple[Path, ...]]:
     """The wheels for every target, and for this machine, which must describe the plugin."""
     targets = list(dict.fromkeys((*options.targets, Target.here())))
-    steps = 4 + len(options.targets)
-    progress("fetching the wheels that it depends on", 1, steps)
+    steps.at("fetching the wheels that it depends on", 1)
     fetched = _all_of(
         [
             partial(resolve.fetch, own, target, work / f"fetched-{number}", sources)
