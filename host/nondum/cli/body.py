@@ -112,7 +112,8 @@ def store(session: Session) -> None:
     ]
     table(shown, ["file", "size", "used_by", "sha256"], empty="the store is empty")
     if rows:
-        click.echo(f"{len(rows)} files, {render.size(sum(row['bytes'] for row in rows))}")
+        files = "1 file" if len(rows) == 1 else f"{len(rows)} files"
+        click.echo(f"{files}, {render.size(sum(row['bytes'] for row in rows))}")
 
 
 @click.command()

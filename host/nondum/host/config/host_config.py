@@ -102,7 +102,7 @@ class InstallSection:
     reserve_mb: int = 64
     """Disk that is left free whatever is plugged in."""
     quota_mb: int = 4096
-    """Size that the store is pruned to, least recently used first."""
+    """Size that wheels and data in the store are pruned to, least recently used first."""
 
 
 @frozen

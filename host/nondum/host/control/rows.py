@@ -83,7 +83,7 @@ def payload_row(
 ) -> Row:
     """A payload: how far it has come, where it is, what is wrong with it, and the peer that it runs
     on, if it does. `rollbacks` are the digests of those that people went back to, `components` all
-    that are here: devices and data that those of the payload wait for are told."""
+    that are here: the row names each device and all data that the payload's own wait for."""
     return {
         "payload": payload.payload_id,
         "key": payload.key,

@@ -160,7 +160,12 @@ class Executor:
         return told
 
     async def _fill_cache(self) -> None:
-        await self.installation.fill_cache()
+        try:
+            await self.installation.fill_cache()
+        except asyncio.CancelledError:  # for something urgent: it is begun again
+            raise
+        except Exception:
+            log.exception("what was withdrawn is not cached")
         self._is_fill_waiting = False
 
     def _want_prune(self) -> None:

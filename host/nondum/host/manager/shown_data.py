@@ -1,4 +1,4 @@
-"""Data are shown to components: linked into a folder that their workers see, which are told of it.
+"""Shows data to components: links the files into a folder that their workers see, and tells these.
 
 A worker may still read what it has open of data that are gone.
 """

@@ -34,7 +34,7 @@ MINIMUM_NONDUM = "0.1"
 """The oldest nondum that reads what is written here."""
 _PIECE = 4 * 1024 * 1024
 _FINE = 100
-"""What is told of one step's parts."""
+"""Parts of a step, as progress counts them."""
 PROCESSES = 4
 """pips at once: they wait for the index most of the time."""
 

@@ -14,6 +14,7 @@ import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO
 
 from nondum.sdk.errors import DriveGone, InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse.format import contents, names
@@ -194,27 +195,32 @@ def _copy_bytes(
     """Digest and size of what was read; at most one byte more than listed. Without a target, none
     of it is written."""
     digest, size = hashlib.sha256(), 0
-    if target is None:
+    with _opened(target) as out:
         for piece in _pieces(descriptor, entry.size + 1, folder):
             digest.update(piece)
-            size += len(piece)
-            copied(len(piece))
-        return digest.hexdigest(), size
-    _make_folder(target.parent)
-    try:
-        # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
-        with target.open("xb") as out:
-            for piece in _pieces(descriptor, entry.size + 1, folder):
-                digest.update(piece)
+            if out is not None:
                 out.write(piece)
                 if size // _WRITTEN_OUT < (size + len(piece)) // _WRITTEN_OUT:
                     out.flush()
                     os.fdatasync(out.fileno())
-                size += len(piece)
-                copied(len(piece))
+            size += len(piece)
+            copied(len(piece))
+    return digest.hexdigest(), size
+
+
+@contextmanager
+def _opened(target: Path | None) -> Iterator[BinaryIO | None]:
+    """A file that is made, with its folders; None for none. Raises `InstallFailed`."""
+    if target is None:
+        yield None
+        return
+    _make_folder(target.parent)
+    try:
+        # Buffered: a raw file on a full disk writes less than it was given, and does not raise.
+        with target.open("xb") as out:
+            yield out
     except OSError as error:
         raise _unstaged(target, error) from error
-    return digest.hexdigest(), size
 
 
 def _pieces(descriptor: int, limit: int, folder: Path) -> Iterator[bytes]:
