@@ -90,6 +90,13 @@ def test_a_relative_path_is_taken_from_the_current_folder(
     assert config.drives.slots == (tmp_path / "d",)
 
 
+@pytest.mark.parametrize("written", ["~no.such.user/x", "a\\u0000", ""])
+@pytest.mark.parametrize("line", ['[host]\nstate = "{}"', '[drives]\nslots = ["/a", "{}"]'])
+def test_what_names_no_path_is_refused(line: str, written: str) -> None:
+    (problem,) = refused(line.format(written))
+    assert problem.startswith("CONFIG_VALUE host.toml:2: ")
+
+
 def test_all_mistakes_are_told_at_once() -> None:
     remedy = " → correct it; docs/configuration.md says what is expected"
     assert refused(
@@ -97,7 +104,8 @@ def test_all_mistakes_are_told_at_once() -> None:
         '[install]\nmethod = "conda"\nreserve_mb = true\n'
     ) == [
         "CONFIG_KEY host.toml:3 [host]: unknown key 'stat' → did you mean 'state'?",
-        "CONFIG_VALUE host.toml:5: [drives] slots = '/a': expected a list of paths" + remedy,
+        "CONFIG_VALUE host.toml:5: [drives] slots = '/a': expected a list of paths, each "
+        "a path as a string; `~user/` only of a user of this host" + remedy,
         "CONFIG_KEY host.toml:6: unknown key 'dirves' → did you mean 'drives'?",
         "CONFIG_VALUE host.toml:9: [install] reserve_mb = True: expected a whole number of at "
         "least 0" + remedy,

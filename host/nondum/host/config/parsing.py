@@ -25,19 +25,37 @@ REACHED_BY = ("listen", "static", "development")
 _REFERENCE = re.compile(r"[\w.]+:\w+")
 _AT_LINE = re.compile(r"at line (\d+)")
 HOST_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_A_PATH = "a path as a string; `~user/` only of a user of this host"
 KINDS: Mapping[Any, str] = {
     str: "a string",
     int: "a whole number of at least 0",
     float: "a number above 0",
     bool: "true or false",
-    Path: "a path as a string",
-    Path | None: "a path as a string",
-    tuple[Path, ...]: "a list of paths",
+    Path: _A_PATH,
+    Path | None: _A_PATH,
+    tuple[Path, ...]: f"a list of paths, each {_A_PATH}",
     tuple[str, ...]: "a list of strings",
     Level: confinement.EXPECTED,
     Wanted: f'"auto", {confinement.EXPECTED}',
 }
-_PARSERS: Mapping[Any, Callable[[object], Any]] = {Level: confinement.parse, Wanted: parse_wanted}
+
+
+def _path(value: object) -> Path:
+    """Absolute: processes that the daemon starts work in other folders."""
+    if not isinstance(value, str) or not value or "\0" in value:
+        raise ValueError(value)
+    try:
+        return Path(value).expanduser().absolute()
+    except RuntimeError as error:  # `~name/` of a user that there is not
+        raise ValueError(value) from error
+
+
+_PARSERS: Mapping[Any, Callable[[object], Any]] = {
+    Level: confinement.parse,
+    Wanted: parse_wanted,
+    Path: _path,
+    Path | None: _path,
+}
 """Kinds of values that are read from text or numbers; each raises `ValueError`."""
 
 
@@ -138,9 +156,6 @@ def _typed(hint: Any, value: Any) -> Any:
         (item, _) = get_args(hint)
         typed = [_typed(item, v) for v in value] if isinstance(value, list) else [None]
         return None if None in typed else tuple(typed)
-    if hint in (Path, Path | None):
-        # Absolute: processes that the daemon starts work in other folders.
-        return Path(value).expanduser().absolute() if isinstance(value, str) and value else None
     if hint is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return float(value) if is_number and value > 0 else None
