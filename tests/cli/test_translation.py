@@ -20,7 +20,9 @@ from nondum.sdk import hookimpl
 MEANINGS = {
     "brighten up": {"pddl": "(lit self)", "kind": "maintain"},
     "say hello to everybody": {"pddl": "(greeted person self)"},
+    "more light": {"words": "Shine for everybody!"},
     "go away": {"pddl": "(litt self)"},
+    "dance": {"words": "waltz with people"},
     "sing": {"song": "la la"},
 }
 
@@ -32,6 +34,7 @@ def translate_goal(ctx, words, vocabulary):
         raise RuntimeError(vocabulary)
     if words == "repeat":
         assert vocabulary["sentences"] == ["greet people", "shine"], vocabulary
+        assert {"words": "greet {c}", "slots": {"c": ["people"]}} in vocabulary["phrases"]
         assert {"name": "person", "types": ["class"], "words": "people"} in vocabulary["objects"]
         assert "(lit ?1 - host)" in vocabulary["predicates"]
         return MEANINGS["brighten up"]
@@ -86,6 +89,12 @@ def test_machine_is_told_who_understood_what(daemon: RunningHost) -> None:
     assert given["understood"] == expected
 
 
+def test_translation_may_be_another_sentence(daemon: RunningHost) -> None:
+    given = daemon.run("goal", "more light", "--yes", "--json").ok().json
+    assert given["understood"]["goal"] == "(lit panther)"
+    assert given["understood"]["kind"] == "maintain"
+
+
 def test_translation_is_never_taken_unasked(daemon: RunningHost) -> None:
     before = len(daemon.run("goals", "--json").ok().json["given"])
     daemon.run("goal", "brighten up").refused(1, f"TRANSLATION_UNCONFIRMED {LIT} → ")
@@ -110,6 +119,7 @@ def test_person_declines_at_the_terminal(daemon: RunningHost) -> None:
     [
         ("go away", "TRANSLATION_REFUSED interpreter: it understands '(litt self)'"),
         ("go away", "did you mean 'lit'?"),
+        ("dance", "TRANSLATION_REFUSED interpreter: it understands 'waltz with people'"),
         ("sing", "TRANSLATION_INVALID interpreter: its answer is no goal"),
         ("think hard", "TRANSLATION_OVERDUE interpreter: no answer within 1 s"),
         ("mumble", "PHRASE_UNKNOWN"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from functools import partial
 from itertools import islice
 from typing import Any, TypeAlias, cast, get_args
 
@@ -16,6 +17,9 @@ from nondum.host.mind.composition import Composition
 from nondum.planning.merge.domain import Predicate
 from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.syntax import type_text
+from nondum.planning.words.pattern import Slot, with_slots
+from nondum.planning.words.phrase import KnownPhrase
+from nondum.planning.words.phrases import Phrasebook
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.frozen import frozen
 
@@ -85,13 +89,15 @@ async def translated(
 def vocabulary(composition: Composition) -> Vocabulary:
     """What a translator is told of the words known now, shortened to fit a packet.
 
-    `host`; `sentences` that can be said; `objects`: `name`, `types`, `words`; `predicates` as PDDL
-    declares them.
+    `host`; `sentences` that can be said; `phrases`, the same with slots: `words`, and in `slots`
+    what may be said in each, nothing where any words may; `objects`: `name`, `types`, `words`;
+    `predicates` as PDDL declares them.
     """
     merged, book = composition.merged, composition.book
     told: Vocabulary = {
         "host": composition.host,
         "sentences": list(islice(book.offers(), _ENTRIES)),
+        "phrases": [_phrase(phrase, book) for phrase in islice(book.phrases, _ENTRIES)],
         "predicates": [
             _declared(predicate)
             for predicate in islice(merged.domain.predicates.values(), _ENTRIES)
@@ -104,6 +110,17 @@ def vocabulary(composition: Composition) -> Vocabulary:
     while len(json.dumps(told)) > VOCABULARY_BYTES:
         told = {k: v[: len(v) // 2] if isinstance(v, list) else v for k, v in told.items()}
     return told
+
+
+def _phrase(phrase: KnownPhrase, book: Phrasebook) -> dict[str, Any]:
+    """A phrase and what may be said in the slots that must be filled."""
+    slots = (part for part in phrase.parts if isinstance(part, Slot))
+    names = {slot.name: [] if slot.is_free else _said(slot, book) for slot in slots}
+    return {"words": with_slots(phrase.parts), "slots": names}
+
+
+def _said(slot: Slot, book: Phrasebook) -> list[str]:
+    return [book.labels[thing] for thing in book.things_for(slot)[:_ENTRIES]]
 
 
 def _declared(predicate: Predicate) -> str:
@@ -142,15 +159,20 @@ def _checked(
     component: str, answer: Mapping[str, Any], composition: Composition
 ) -> tuple[str, GoalKind]:
     """The goal that an answer gives. Raises `GoalRefused` that names the component."""
-    pddl, kind = answer.get("pddl"), answer.get("kind", "achieve")
-    if not isinstance(pddl, str) or kind not in get_args(GoalKind):
-        message = f"its answer is no goal: {str(dict(answer))[:200]}"
-        raise GoalRefused(Problem("TRANSLATION_INVALID", message, where=component))
+    match answer:
+        case {"words": str(meant)}:
+            read = partial(composition.book.goal, meant)
+        case {"pddl": str(meant)} if answer.get("kind", "achieve") in get_args(GoalKind):
+            kind = cast(GoalKind, answer.get("kind", "achieve"))
+            read = partial(parse_goal, meant, composition.merged, kind=kind)
+        case _:
+            message = f"its answer is no goal: {str(dict(answer))[:200]}"
+            raise GoalRefused(Problem("TRANSLATION_INVALID", message, where=component))
     try:
-        goal = parse_goal(pddl, composition.merged, kind=cast(GoalKind, kind))
+        goal = read()
     except GoalRefused as refused:
         why = "; ".join(_first_line(problem) for problem in refused.problems)
-        message = f"it understands {pddl[:200]!r}, which means nothing here: {why}"
+        message = f"it understands {meant[:200]!r}, which means nothing here: {why}"
         raise GoalRefused(Problem("TRANSLATION_REFUSED", message, where=component)) from refused
     return goal_text(goal.expr), goal.kind
 

@@ -98,6 +98,15 @@ def with_blanks(text: str) -> str:
     return " ".join(_spoken(parts, _blank))
 
 
+def with_slots(parts: Sequence[Part]) -> str:
+    """A pattern's words and the names of its slots, without what may be left out.
+
+    >>> with_slots(parse_pattern("[please] point at {t:target}"))
+    'point at {t}'
+    """
+    return " ".join(_spoken(parts, lambda slot: f"{{{slot.name}}}"))
+
+
 def _blank(slot: Slot) -> str:
     return f"<{slot.name if slot.is_free or not slot.types else ' or '.join(slot.types)}>"
 

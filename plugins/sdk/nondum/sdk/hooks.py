@@ -104,13 +104,15 @@ async def stop(ctx: Context) -> None:
 async def translate_goal(
     ctx: Context, words: str, vocabulary: Mapping[str, Any]
 ) -> Mapping[str, str] | None:
-    """Translate words that match no phrase, or give None:
-    `{"pddl": "(following self person)", "kind": "maintain"}`; without `kind`, `achieve`.
+    """Translate words that match no phrase into some that do, `{"words": "follow the person"}`, or
+    into a goal, `{"pddl": "(following self person)", "kind": "maintain"}` (without `kind`,
+    `achieve`), or give None.
 
-    `vocabulary` is what is known now: `host`; `sentences` that are understood; `objects`, each with
-    `name`, `types` and `words`; `predicates` as PDDL declares them. The answer is parsed and
-    type-checked like anyone's, and shown to the person, who confirms it. A host waits for it
-    `planning.translate_s`.
+    `vocabulary` is what is known now: `host`; `sentences` that are understood; `phrases`, the same
+    with slots, `{"words": "search for {class}", "slots": {"class": ["people"]}}`, where a slot
+    without names takes any words; `objects`, each with `name`, `types` and `words`; `predicates` as
+    PDDL declares them. The answer is parsed and type-checked like anyone's, and shown to the
+    person, who confirms it. A host waits for it `planning.translate_s`.
     """
 
 
