@@ -1,7 +1,7 @@
 """What memory GPUs have: what NVML says, or the system's own where a GPU shares it.
 
-NVML is asked through nvidia-ml-py where that is installed (`nondum[gpu]`), and only by processes
-that end soon: it keeps memory and threads.
+NVML is asked through nvidia-ml-py, and only by processes that end soon: it keeps memory and
+threads.
 """
 
 from __future__ import annotations
@@ -45,10 +45,8 @@ def shares_memory(model: str) -> bool:
 
 
 def _asked_of_nvml() -> Gpu | None:
-    try:
-        import pynvml
-    except ImportError:
-        return None
+    import pynvml  # not by those that only judge what others saw
+
     try:
         pynvml.nvmlInit()
         handles = map(pynvml.nvmlDeviceGetHandleByIndex, range(pynvml.nvmlDeviceGetCount()))
