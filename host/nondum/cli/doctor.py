@@ -17,6 +17,7 @@ from nondum.cli.session import Session
 from nondum.cli.table import table
 
 if TYPE_CHECKING:
+    from nondum.host.config.effective import Asked
     from nondum.transport.discovery.doctor import Finding
 
 
@@ -28,9 +29,14 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="The configuration to look by [default: the system's, none with --user].",
 )
+@click.option(
+    "--board",
+    is_flag=True,
+    help="Tell what this machine is instead, as Markdown to paste into an issue; takes seconds.",
+)
 @json_option
 @click.pass_context
-def doctor(ctx: click.Context, user: bool, config_file: Path | None) -> int | None:
+def doctor(ctx: click.Context, user: bool, config_file: Path | None, board: bool) -> int | None:
     """Look for what is wrong around this host, without a daemon.
 
     Without a command, everything is looked at. Exits with 3 when something is bad; what is doubtful
@@ -39,6 +45,7 @@ def doctor(ctx: click.Context, user: bool, config_file: Path | None) -> int | No
     \b
     Examples: nondum doctor
               nondum doctor --user --json
+              nondum doctor --board
               nondum doctor network
     """
     if ctx.invoked_subcommand is not None:
@@ -47,7 +54,10 @@ def doctor(ctx: click.Context, user: bool, config_file: Path | None) -> int | No
     from nondum.cli.examination.finding import is_well, row
     from nondum.host.config.effective import Asked
 
-    found = list(examine(Asked(is_user=user, file=config_file)))
+    asked = Asked(is_user=user, file=config_file)
+    if board:
+        return _board(asked, as_json=ctx.obj.as_json)
+    found = list(examine(asked))
     rows = [row(finding) for finding in found]
     if ctx.obj.as_json:
         render.as_json({"ok": is_well(found), "findings": rows})
@@ -141,6 +151,18 @@ def limits(session: Session) -> int:
         for problem in problems:
             render.sentence(str(problem), mark="→ ")
     return EXIT_PROBLEMS if problems else 0
+
+
+def _board(asked: Asked, *, as_json: bool) -> int:
+    from nondum.cli.board.report import markdown, rows
+    from nondum.host.config.effective import effective
+
+    told = list(rows(effective(asked)))
+    if as_json:
+        render.as_json([row.to_dict() for row in told])
+    else:
+        render.sentence(markdown(told))
+    return 0
 
 
 def _row(finding: Finding) -> dict[str, Any]:
