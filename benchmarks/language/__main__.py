@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.language import corpus
 from benchmarks.language.corpus import Sentence
 from benchmarks.language.scoring import Score, judged, scored
-from benchmarks.language.understanding import Declared, Rung, WordOverlap, robot
+from benchmarks.language.understanding import Declared, Nearly, Rung, WordOverlap, robot
 
 PAGE = Path(__file__).parents[2] / "docs/benchmarks/language.md"
 METHOD = Path(__file__).with_name("method.md")
@@ -19,7 +19,7 @@ def main() -> None:
     """Ask every rung, print the tables, and write the page."""
     chosen = _arguments()
     to = robot()
-    rungs: tuple[Rung, ...] = (Declared(to), WordOverlap(to))
+    rungs: tuple[Rung, ...] = (Declared(to), Nearly(to), WordOverlap(to))
     every = corpus.sentences()
     if chosen.show:
         print("\n".join(_shown(rungs, every)))

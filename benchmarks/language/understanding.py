@@ -14,6 +14,7 @@ from nondum.planning.merge.contribution import Contribution
 from nondum.planning.merge.goal import Goal, parse_goal
 from nondum.planning.merge.merge import merge
 from nondum.planning.pddl.normal import Condition
+from nondum.planning.words.near import nearest
 from nondum.planning.words.pattern import words_of
 from nondum.planning.words.phrases import Phrasebook, phrasebook
 from nondum.sdk.description import PluginDescription
@@ -88,6 +89,22 @@ class Declared:
             return self._robot.letter(self._robot.book.goal(sentence))
         except GoalRefused:
             return ""
+
+
+class Nearly:
+    """Declared phrases, and what is nearly one: asked back."""
+
+    name = "nearly declared"
+
+    def __init__(self, to: Robot) -> None:
+        self._robot = to
+
+    def meaning(self, sentence: str) -> str:
+        """The goal of the phrase that it is, or of the only one that is near."""
+        if said := Declared(self._robot).meaning(sentence):
+            return said
+        near = nearest(self._robot.book, sentence)
+        return self._robot.letter(near[0].reading.goal) if len(near) == 1 else ""
 
 
 class WordOverlap:

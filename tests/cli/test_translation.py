@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from demo.robot import View
@@ -53,8 +54,7 @@ LIT = "understood by interpreter as maintain (lit panther)"
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningHost]:
-    patience = "[planning]\ntranslate_s = 1.0\n"
-    with running(tmp_path_factory.mktemp("host"), name="panther", more=patience) as daemon:
+    with running(tmp_path_factory.mktemp("host"), name="panther") as daemon:
         for name, source in (("beacon", BEACON), ("interpreter", INTERPRETER)):
             daemon.plug(daemon.drive(name, Part(name, source)))
         daemon.until(
@@ -85,14 +85,22 @@ def test_translation_is_taken_where_the_person_said_so(daemon: RunningHost) -> N
 
 def test_machine_is_told_who_understood_what(daemon: RunningHost) -> None:
     given = daemon.run("goal", "repeat", "--yes", "--json").ok().json
-    expected = {"goal": "(lit panther)", "kind": "maintain", "by": ["interpreter"]}
+    expected = {"goal": "(lit panther)", "kind": "maintain", "by": ["interpreter"], "words": ""}
     assert given["understood"] == expected
 
 
 def test_translation_may_be_another_sentence(daemon: RunningHost) -> None:
     given = daemon.run("goal", "more light", "--yes", "--json").ok().json
-    assert given["understood"]["goal"] == "(lit panther)"
-    assert given["understood"]["kind"] == "maintain"
+    expected = {"goal": "(lit panther)", "kind": "maintain", "words": "Shine for everybody!"}
+    assert given["understood"] == expected | {"by": ["interpreter"]}
+
+
+def test_slip_of_the_keys_is_asked_back(daemon: RunningHost) -> None:
+    nearly = 'understood by panther as "greet people": achieve (greeted person panther)'
+    daemon.run("goal", "could", "you", "gret", "people", "please").refused(1, nearly)
+    given = daemon.run("goal", "gret people", "--yes", "--json").ok().json
+    expected = {"goal": "(greeted person panther)", "kind": "achieve", "words": "greet people"}
+    assert given["understood"] == expected | {"by": ["panther"]}
 
 
 def test_translation_is_never_taken_unasked(daemon: RunningHost) -> None:
@@ -121,7 +129,6 @@ def test_person_declines_at_the_terminal(daemon: RunningHost) -> None:
         ("go away", "did you mean 'lit'?"),
         ("dance", "TRANSLATION_REFUSED interpreter: it understands 'waltz with people'"),
         ("sing", "TRANSLATION_INVALID interpreter: its answer is no goal"),
-        ("think hard", "TRANSLATION_OVERDUE interpreter: no answer within 1 s"),
         ("mumble", "PHRASE_UNKNOWN"),
         ("what do you know", "PHRASE_UNKNOWN"),
     ],
@@ -129,6 +136,14 @@ def test_person_declines_at_the_terminal(daemon: RunningHost) -> None:
 def test_what_means_nothing_is_refused_by_name(daemon: RunningHost, words: str, why: str) -> None:
     ran = daemon.run("goal", words, "--yes")
     ran.refused(1, "PHRASE_UNKNOWN").refused(1, why)
+
+
+def test_component_that_does_not_answer_is_not_waited_for(tmp_path: Path) -> None:
+    patience = "[planning]\ntranslate_s = 0.5\n"
+    with running(tmp_path, name="panther", more=patience) as daemon:
+        daemon.bring("interpreter", Part("interpreter", INTERPRETER))
+        ran = daemon.run("goal", "think hard", "--yes").refused(1, "PHRASE_UNKNOWN")
+        ran.refused(1, "TRANSLATION_OVERDUE interpreter: no answer within 0.5 s")
 
 
 def test_different_translations_are_told_and_none_is_chosen(daemon: RunningHost) -> None:

@@ -63,9 +63,10 @@ def goal(
 ) -> int:
     """Give the robot a goal, in words or in PDDL.
 
-    `nondum goals` says which words are understood now. Others may be translated by a component:
-    what it understood is shown, and given only once it is confirmed. Words that a peer can have and
-    this host cannot, or that begin with its name, are given to the peer.
+    `nondum goals` says which words are understood now. Others may be nearly one of these, or be
+    translated by a component: what was understood is shown, and given only once it is confirmed.
+    Words that a peer can have and this host cannot, or that begin with its name, are given to the
+    peer.
 
     A goal to maintain, such as "follow me", replaces older ones to maintain of the same or a lower
     priority, if their plans need the same: which ones is shown. Of JSON, they are `replaces`.
@@ -168,7 +169,8 @@ def _confirmed(
 
 def _understood(understood: dict[str, Any]) -> str:
     by = " and ".join(understood["by"])
-    return f"understood by {by} as {understood['kind']} {understood['goal']}"
+    words = f'"{understood["words"]}": ' if understood["words"] else ""
+    return f"understood by {by} as {words}{understood['kind']} {understood['goal']}"
 
 
 def _settled(session: Session, given: dict[str, Any]) -> dict[str, Any]:

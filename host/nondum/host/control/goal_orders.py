@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any, cast, get_args
 
@@ -112,7 +113,8 @@ class GoalOrders:
         self, words: str, priority: int, refused: GoalRefused, arguments: Arguments
     ) -> Row:
         try:
-            understood = await self.translated(words, refused)
+            understood = await self._nearly(words, refused)
+            understood = understood or await self.translated(words, refused)
         except GoalRefused as unknown:
             return self._kept(words, priority, unknown, arguments)
         if not arguments.flag("yes"):
@@ -175,6 +177,13 @@ class GoalOrders:
             self.workers.halt_all()
         goals = [goal for goal in open_goals if id in (None, goal)]
         return {"goals": goals, "halted": list(halted), "peers": []}
+
+    async def _nearly(self, words: str, refused: GoalRefused) -> Understood | None:
+        """The phrase that words are nearly. Raises `GoalRefused`."""
+        composition = self.mind.composition
+        if composition is None or refused.code not in translation.UNMATCHED:
+            return None
+        return await asyncio.to_thread(translation.nearly, words, composition)
 
     async def translated(self, words: str, refused: GoalRefused) -> Understood:
         """What components take words to mean that match no phrase. Raises `GoalRefused`."""

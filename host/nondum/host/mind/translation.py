@@ -1,4 +1,4 @@
-"""Words that match no phrase, translated by components; every answer is checked like anyone's.
+"""Words that match no phrase: nearly one, or translated by components, whose answers are checked.
 
 Nothing is guessed: answers that mean nothing here are refused by name, and different ones are told
 instead of chosen from.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any, TypeAlias, cast, get_args
@@ -17,6 +18,7 @@ from nondum.host.mind.composition import Composition
 from nondum.planning.merge.domain import Predicate
 from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.syntax import type_text
+from nondum.planning.words.near import Near, nearest
 from nondum.planning.words.pattern import Slot, with_slots
 from nondum.planning.words.phrase import KnownPhrase
 from nondum.planning.words.phrases import Phrasebook
@@ -45,14 +47,35 @@ class Understood:
     pddl: str
     kind: GoalKind
     by: tuple[str, ...]
-    """The components that understand it so."""
+    """The components that understand it so; this host, where it is nearly a phrase."""
+    words: str = ""
+    """The sentence that it is taken for; empty where PDDL was given instead."""
 
     def __str__(self) -> str:
-        return f"understood by {' and '.join(self.by)} as {self.kind} {self.pddl}"
+        words = f'"{self.words}": ' if self.words else ""
+        return f"understood by {' and '.join(self.by)} as {words}{self.kind} {self.pddl}"
 
     def to_dict(self) -> dict[str, object]:
         """Plain data for people's tools."""
-        return {"goal": self.pddl, "kind": self.kind, "by": list(self.by)}
+        return {"goal": self.pddl, "kind": self.kind, "by": list(self.by), "words": self.words}
+
+
+def nearly(words: str, composition: Composition) -> Understood | None:
+    """The only phrase that words are nearly; it takes its time, and is to be confirmed.
+
+    Raises `GoalRefused` (TRANSLATION_AMBIGUOUS) where several are near.
+    """
+    near = nearest(composition.book, words)
+    readings = [_as_phrase(one, composition.host) for one in near]
+    if len(readings) > 1:
+        said = " or ".join(f'"{one.words}"' for one in near)
+        raise GoalRefused(_ambiguous(words, readings, fix=f"say {said}"))
+    return readings[0] if readings else None
+
+
+def _as_phrase(near: Near, host: str) -> Understood:
+    goal = near.reading.goal
+    return Understood(goal_text(goal.expr), goal.kind, (host,), near.words)
 
 
 async def translated(
@@ -65,20 +88,24 @@ async def translated(
 ) -> Understood:
     """Have components translate what matched no phrase; one that hangs is cut off.
 
-    `refused` is why it did not. Raises `GoalRefused` with that, and with what is wrong with the
-    answers (TRANSLATION_INVALID, TRANSLATION_REFUSED, TRANSLATION_OVERDUE), or with
+    `refused` is why it did not. Raises `GoalRefused` with that, and with what is wrong with
+    the answers (TRANSLATION_INVALID, TRANSLATION_REFUSED, TRANSLATION_OVERDUE), or with
     TRANSLATION_AMBIGUOUS.
     """
     if refused.code not in UNMATCHED or len(words) > LONGEST_WORDS:
         raise refused
     answers, problems = await _gathered(ask(vocabulary(composition())), deadline_s)
-    found: dict[tuple[str, GoalKind], list[str]] = {}
+    found: dict[tuple[str, GoalKind], Understood] = {}
     for component, answer in sorted(answers.items()):
         try:
-            found.setdefault(_checked(component, answer, composition()), []).append(component)
+            one = _checked(component, answer, composition())
         except GoalRefused as wrong:
             problems += wrong.problems
-    readings = [Understood(pddl, kind, tuple(by)) for (pddl, kind), by in found.items()]
+            continue
+        before = found.setdefault((one.pddl, one.kind), one)
+        if before is not one:
+            found[one.pddl, one.kind] = replace(before, by=(*before.by, component))
+    readings = list(found.values())
     if len(readings) > 1:
         raise GoalRefused(_ambiguous(words, readings))
     if not readings:
@@ -155,10 +182,8 @@ async def _awaited(answer: Awaitable[Mapping[str, Any] | None]) -> Mapping[str, 
     return await answer
 
 
-def _checked(
-    component: str, answer: Mapping[str, Any], composition: Composition
-) -> tuple[str, GoalKind]:
-    """The goal that an answer gives. Raises `GoalRefused` that names the component."""
+def _checked(component: str, answer: Mapping[str, Any], composition: Composition) -> Understood:
+    """What an answer means. Raises `GoalRefused` that names the component."""
     match answer:
         case {"words": str(meant)}:
             read = partial(composition.book.goal, meant)
@@ -174,7 +199,8 @@ def _checked(
         why = "; ".join(_first_line(problem) for problem in refused.problems)
         message = f"it understands {meant[:200]!r}, which means nothing here: {why}"
         raise GoalRefused(Problem("TRANSLATION_REFUSED", message, where=component)) from refused
-    return goal_text(goal.expr), goal.kind
+    words = meant if "words" in answer else ""
+    return Understood(goal_text(goal.expr), goal.kind, (component,), words)
 
 
 def _first_line(problem: Problem) -> str:
@@ -182,7 +208,7 @@ def _first_line(problem: Problem) -> str:
     return f"{problem.message.splitlines()[0]}{fix}"
 
 
-def _ambiguous(words: str, readings: Iterable[Understood]) -> Problem:
+def _ambiguous(words: str, readings: Iterable[Understood], fix: str = "") -> Problem:
     meanings = ", or ".join(map(str, readings))
-    fix = "say it in other words, or give the goal with --pddl"
+    fix = fix or "say it in other words, or give the goal with --pddl"
     return Problem("TRANSLATION_AMBIGUOUS", f"{words!r} is {meanings}", fix=fix)

@@ -11,7 +11,7 @@ from nondum.sdk.frozen import frozen
 FREE_WORDS = "text"
 """The slot type that takes any words, and binds nothing."""
 
-_ARTICLES = frozenset({"the", "a", "an"})
+ARTICLES = frozenset({"the", "a", "an"})
 _PART = re.compile(r"\s*(?:\{\s*([\w-]+)\s*(?::\s*([\w-]+)\s*)?\}|([\[\]])|([^\s\[\]{}]+))")
 _SEPARATORS = re.compile(r"[^\w'-]+")
 
@@ -69,7 +69,7 @@ def name_words(words: Sequence[str]) -> tuple[str, ...]:
     ('radiation', 'source')
     """
     opened = tuple(part for word in words for part in word.split("-") if part)
-    return opened[1:] if len(opened) > 1 and opened[0] in _ARTICLES else opened
+    return opened[1:] if len(opened) > 1 and opened[0] in ARTICLES else opened
 
 
 def as_said(text: str) -> str:

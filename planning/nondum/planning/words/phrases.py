@@ -12,6 +12,7 @@ from nondum.planning.merge.goal import Goal
 from nondum.planning.merge.scope import SELF
 from nondum.planning.words.pattern import Part, Said, Slot, Word, matches, name_words, words_of
 from nondum.planning.words.phrase import KnownPhrase, known_phrases
+from nondum.planning.words.turning import turning_words
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.frozen import frozen
 
@@ -57,7 +58,11 @@ class Phrasebook:
     """Phrases that cannot be used, and why."""
 
     def goal(self, sentence: str) -> Goal:
-        """The goal that a sentence asks for.
+        """The goal that a sentence asks for. Raises `GoalRefused` as `reading` does."""
+        return self.reading(sentence).goal
+
+    def reading(self, sentence: str) -> Reading:
+        """What a sentence means.
 
         Raises `GoalRefused`: PHRASE_UNKNOWN, PHRASE_WORDS_UNKNOWN, PHRASE_AMBIGUOUS.
         """
@@ -69,7 +74,7 @@ class Phrasebook:
             raise GoalRefused(self._ambiguous(sentence, found))
         if not found:
             raise GoalRefused(self._unknown(sentence, words))
-        return found[0].goal
+        return found[0]
 
     def offers(self) -> tuple[str, ...]:
         """Sentences that can be said now: each phrase with every name that fits its slots."""
@@ -82,7 +87,7 @@ class Phrasebook:
         """
         for phrase in self.phrases:
             for sentence, bound in islice(self._sentences(phrase.parts), MAX_OFFERS):
-                yield self._reading(phrase, bound, sentence)
+                yield self.reading_of(phrase, bound, sentence)
 
     def things_for(self, slot: Slot) -> tuple[str, ...]:
         """The objects that can be named in a slot."""
@@ -94,11 +99,12 @@ class Phrasebook:
         for phrase in self.phrases:
             for said in matches(phrase.parts, words, self._is_name):
                 for bound in self._bindings(phrase, said):
-                    reading = self._reading(phrase, bound, sentence)
+                    reading = self.reading_of(phrase, bound, sentence)
                     found.setdefault(reading.meaning, reading)
         return list(found.values())
 
-    def _reading(self, phrase: KnownPhrase, bound: Mapping[str, str], sentence: str) -> Reading:
+    def reading_of(self, phrase: KnownPhrase, bound: Mapping[str, str], sentence: str) -> Reading:
+        """What a phrase means with objects in its slots."""
         names = {SELF: self.merged.self_host, **{f"?{slot}": name for slot, name in bound.items()}}
         return Reading(phrase, bound, Goal(phrase.condition.bound(names), phrase.kind, sentence))
 
@@ -119,7 +125,8 @@ class Phrasebook:
         return self.merged.domain.types.is_one_of(types, slot.types)
 
     def _is_name(self, slot: Slot, words: tuple[str, ...]) -> bool:
-        return slot.is_free or bool(self._meant(slot, words))
+        """Words of a free slot change nothing, so none may be there that turns what is meant."""
+        return not turning_words(words) if slot.is_free else bool(self._meant(slot, words))
 
     def _sentences(self, parts: tuple[Part, ...]) -> Iterator[tuple[str, dict[str, str]]]:
         """Sentences of a pattern, the shortest way, and what their slots stand for."""
@@ -161,6 +168,8 @@ class Phrasebook:
         offers = self.offers()
         near = get_close_matches(" ".join(words), offers, n=3, cutoff=0.5)
         fix = _listed("say", near) if near else _listed("you can say", offers[:3])
+        for word, turn in islice(turning_words(words).items(), 1):
+            fix = f"{word!r} is in it: {turn.value}; {fix}"
         return Problem("PHRASE_UNKNOWN", f"nothing here understands {sentence!r}", fix=fix)
 
     def _unknown_words(self, slot: Slot, words: tuple[str, ...]) -> Problem:
