@@ -8,8 +8,8 @@ from functools import cache
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.planning.speaking import BASE, COMPTON, POINTER, asked, book
 from tests.planning.strangers import PEOPLE_DETECTOR
-from tests.planning.test_phrases import BASE, COMPTON, POINTER, asked, book
 
 from nondum.planning.words.courtesies import without_courtesies
 from nondum.planning.words.near import FURTHEST, edits, nearest

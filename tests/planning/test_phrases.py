@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.kit.golden import Golden
+from tests.planning.speaking import BASE, COMPTON, DETECTOR, POINTER, asked, book, saying
 from tests.planning.strangers import (
-    COMPTON_CAMERA,
     MOBILE_BASE,
     PAN_TILT_UNIT,
     PEOPLE_DETECTOR,
@@ -18,36 +18,12 @@ from tests.planning.strangers import (
     components,
 )
 
-from nondum.planning.merge.goal import Goal, goal_text
+from nondum.planning.merge.goal import goal_text
 from nondum.planning.merge.merge import merge
 from nondum.planning.words.pattern import PatternInvalid, Word, parse_pattern
-from nondum.planning.words.phrases import MAX_OFFERS, Phrasebook, phrasebook
+from nondum.planning.words.phrases import MAX_OFFERS, phrasebook
 from nondum.sdk.description import Behaviour, Fragment, Label, Phrase, PluginDescription
 from nondum.sdk.errors import GoalRefused
-
-
-def saying(plugin: PluginDescription, *phrases: str) -> PluginDescription:
-    """The plugin with phrases on its first behaviour."""
-    first, *others = plugin.behaviours
-    return replace(plugin, behaviours=(replace(first, phrases=phrases), *others))
-
-
-POINTER = saying(PAN_TILT_UNIT, "point at {t}")
-COMPTON = replace(COMPTON_CAMERA, labels=(Label("radiation-source", "the radiation source"),))
-BASE = replace(
-    MOBILE_BASE,
-    phrases=(Phrase("follow {c:class} [through {words:text}]", "(following self ?c)", "maintain"),),
-)
-DETECTOR = replace(PEOPLE_DETECTOR, labels=(Label("person", "me"), Label("person", "people")))
-
-
-def book(*plugins: PluginDescription) -> Phrasebook:
-    contributions = components(plugins)
-    return phrasebook(contributions, merge(contributions, ROVER))
-
-
-def asked(goal: Goal) -> tuple[str, str]:
-    return goal.kind, goal_text(goal.expr)
 
 
 @pytest.mark.parametrize(
