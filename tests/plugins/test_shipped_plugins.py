@@ -34,7 +34,8 @@ def entry_point(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def shipped() -> dict[str, PluginDescription]:
-    sys.path += [str(folder) for folder in (*FOLDERS, PLUGINS / "espeak", PLUGINS / "panorama")]
+    libraries = (PLUGINS / name for name in ("espeak", "panorama", "phrase-choice"))
+    sys.path += [str(folder) for folder in (*FOLDERS, *libraries)]
     return {folder.name: describe(load(entry_point(folder), folder.name)) for folder in FOLDERS}
 
 

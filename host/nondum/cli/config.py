@@ -14,7 +14,7 @@ from nondum.cli.connection import json_option
 from nondum.cli.failure import EXIT_PROBLEMS, tell_problem
 from nondum.cli.session import Session
 from nondum.cli.table import table
-from nondum.host.config import host_config, reference
+from nondum.host.config import component_settings, host_config, reference
 from nondum.host.config.effective import Asked, as_toml, effective, file_of, remarks, settings
 from nondum.sdk.errors import ConfigRefused
 
@@ -86,6 +86,7 @@ def check(session: Session, file: Path | None, user: bool) -> int:
     try:
         chosen = effective(asked)
         _see_system_tree(chosen.host.system_tree)
+        component_settings.load(chosen.workers.settings)
         warnings = tuple(remarks(asked))
     except ConfigRefused as refused:
         if session.as_json:

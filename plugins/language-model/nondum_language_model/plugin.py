@@ -17,10 +17,9 @@ from nondum.sdk import (
     hookimpl,
 )
 from nondum.sdk.settings import parse_settings
-from nondum_language_model import question
 from nondum_language_model.model import Model
-from nondum_language_model.question import AnswerRefused
 from nondum_language_model.settings import Settings
+from nondum_phrase_choice import choice
 
 
 class LanguageModel:
@@ -70,21 +69,15 @@ class LanguageModel:
         self, ctx: Context, words: str, vocabulary: Mapping[str, Any]
     ) -> dict[str, str] | None:
         """Choose the phrase that means the same, if there is one; in the log is what was asked."""
-        phrases = question.phrases_of(vocabulary)
+        phrases = choice.phrases_of(vocabulary)
         if not phrases or ctx.data("model") is None:
             return None
-        instructions, schema = question.instructions(phrases), question.schema(phrases)
+        instructions, schema = choice.instructions(phrases), choice.schema(phrases)
         async with self._one_at_a_time:
             model = await self._model(ctx)
             answer = await asyncio.to_thread(model.answer, instructions, words, schema)
-        ctx.log.info("%r was said, the model answered %r", words, answer)
-        ctx.log.debug("its instructions: %s", instructions)
-        try:
-            sentence = question.sentence(answer, phrases)
-        except AnswerRefused as refused:
-            ctx.log.warning("the answer is not taken: %s", refused)
-            return None
-        return None if sentence is None else {"words": sentence}
+        ctx.log.debug("the instructions of the model: %s", instructions)
+        return choice.translation(words, answer, phrases, ctx.log)
 
     async def _model(self, ctx: Context) -> Model:
         """The model that is shown now; the one before is left."""

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tiny_model
 
 from nondum.sdk import WorkerFailed
-
-from . import tiny_model
 
 PLUGIN = "nondum_language_model.plugin:LanguageModel"
 VOCABULARY = {

@@ -59,6 +59,7 @@ def _install_options(base: Base) -> InstallOptions:
             scratch_mb=config.workers.scratch_mb,
         ),
         most=_most(config.workers),
+        settings=config.workers.settings,
     )
 
 

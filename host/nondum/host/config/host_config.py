@@ -134,6 +134,9 @@ class WorkersSection:
     """The longest time to start that a payload may ask for a worker."""
     most_scratch_mb: int = 4096
     """The largest scratch folder that a payload may ask for a worker."""
+    settings: Path | None = None
+    """File with settings of components, over those of their payloads, read again for each payload
+    that is plugged in: see above."""
     settle_beats: int = 2
     """Signs of life, two seconds apart, that each worker of a newer release gives before it takes
     over."""

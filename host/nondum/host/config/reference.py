@@ -21,6 +21,7 @@ EXAMPLES = {
     "drives.slots": '["/srv/slots"]',
     "devices.slots": '["/srv/devices"]',
     "workers.confinement": '"sandboxed"',
+    "workers.settings": '"/etc/nondum/settings.toml"',
     "peers.static": '["10.0.0.7", "mule.local:7410"]',
     "peers.offer_actuators": '["gripper"]',
     "router.endpoints": '["tls/router.example:7447"]',

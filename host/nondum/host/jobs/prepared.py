@@ -32,8 +32,9 @@ class Prepared(InstalledComponent):
         told = {**said, "id": name, "scratch": str(scratch), "shown": str(shown)}
         return from_plain(cls, told, said["id"])
 
-    def spec(self, payload: str, limits: Limits) -> WorkerSpec:
-        """What its worker is started from; `limits` hold where it asks for no others."""
+    def spec(self, payload: str, limits: Limits, settings: Mapping[str, Any]) -> WorkerSpec:
+        """What its worker is started from; `limits` hold where it asks for no others, `settings`
+        over those of its payload."""
         changed = self.limits.given()
         changed.pop("startup_s", None)  # no limit of a process, but of how long it is waited for
         return WorkerSpec(
@@ -45,7 +46,7 @@ class Prepared(InstalledComponent):
             python=base_interpreter(),
             scratch=self.scratch,
             index=self.description,
-            settings=self.settings,
+            settings={**self.settings, **settings},
             permissions=self.permissions,
             limits=replace(limits, **changed),
             asked=self.limits,

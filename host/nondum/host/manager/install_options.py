@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import field
+from pathlib import Path
 
 from nondum.host.manager.drive_reading import LOOK_S
 from nondum.host.manager.payload_trust import TrustOptions
@@ -31,4 +32,6 @@ class InstallOptions:
     """Of each worker that asks for no others."""
     most: WorkerLimits = field(default_factory=WorkerLimits)
     """The most that a worker may ask for."""
+    settings: Path | None = None
+    """File with settings of components, over those of their payloads."""
     trust: TrustOptions = field(default_factory=TrustOptions)

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from nondum.host.config import component_settings
 from nondum.host.core import effects
 from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.events.payloads import (
@@ -190,7 +191,8 @@ class Installation:
         await self._workers.ended(effect.after)
         await self.shown.prepare(key, (c.id for c in installed.components if c.data))
         role = Role.BESIDE if effect.beside else Role.ACTIVE
-        specs = installed.specs(self._options.limits)
+        settings = await asyncio.to_thread(component_settings.load, self._options.settings)
+        specs = installed.specs(self._options.limits, settings)
         started = await asyncio.gather(
             *(self._workers.start(spec, role) for spec in specs), return_exceptions=True
         )

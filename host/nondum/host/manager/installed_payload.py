@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from nondum.host.config.component_settings import ComponentSettings
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.data import DataRecord
 from nondum.host.core.records.mount import MountPose
@@ -74,9 +75,13 @@ class InstalledPayload:
         """Its components, by their names on this host."""
         return tuple(component.id for component in self.components)
 
-    def specs(self, limits: Limits) -> tuple[WorkerSpec, ...]:
-        """What its workers are started from."""
-        return tuple(component.spec(self.key, limits) for component in self.components)
+    def specs(self, limits: Limits, settings: ComponentSettings) -> tuple[WorkerSpec, ...]:
+        """What its workers are started from, with this host's settings over its own."""
+        own_ids = (said["id"] for said in self.told["components"])
+        return tuple(
+            component.spec(self.key, limits, settings.get((self.needs.payload_id, own_id), {}))
+            for component, own_id in zip(self.components, own_ids, strict=True)
+        )
 
     def records(self) -> tuple[ComponentRecord, ...]:
         """What the catalogue keeps of its components."""

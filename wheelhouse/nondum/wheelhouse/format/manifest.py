@@ -28,8 +28,8 @@ DATA = "data"
 GRANTABLE = (*PERMISSIONS, GOALS, DATA)
 """What a role may give."""
 
-_PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
-_COMPONENT_ID = Form(
+PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
+COMPONENT_ID = Form(
     names.COMPONENT_ID, "a component's id: lower-case letters, digits and single hyphens"
 )
 _DISTRIBUTION = Form(
@@ -111,7 +111,7 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
         _component(table) for table in root.tables("component", required=not brings_more)
     )
     manifest = Manifest(
-        id=root.text("id", _PAYLOAD_ID),
+        id=root.text("id", PAYLOAD_ID),
         name=root.text("name"),
         summary=root.text("summary", default=""),
         authors=root.texts("authors"),
@@ -125,12 +125,12 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
     root.close()
     if not (manifest.components or brings_more or report.problems):
         report.add("KEY", "a payload brings at least one [[component]] or [[data]]")
-    _tell_twice(report, "data", (d.name for d in manifest.data))
-    _tell_twice(report, "component", (c.id for c in manifest.components))
+    tell_twice(report, "data", (d.name for d in manifest.data))
+    tell_twice(report, "component", (c.id for c in manifest.components))
     for component in manifest.components:
-        _tell_twice(report, f"device of {component.id}", (d.name for d in component.devices))
-        _tell_twice(report, f"unit of {component.id}", (u.name for u in component.units))
-        _tell_twice(report, f"data of {component.id}", (d.name for d in component.data))
+        tell_twice(report, f"device of {component.id}", (d.name for d in component.devices))
+        tell_twice(report, f"unit of {component.id}", (u.name for u in component.units))
+        tell_twice(report, f"data of {component.id}", (d.name for d in component.data))
     report.raise_if_any()
     return manifest
 
@@ -154,7 +154,7 @@ def _requires(table: Table) -> Requires:
 
 def _component(table: Table) -> ComponentManifest:
     component = ComponentManifest(
-        id=table.text("id", _COMPONENT_ID),
+        id=table.text("id", COMPONENT_ID),
         distribution=table.text("distribution", _DISTRIBUTION),
         devices=tuple(_device(device) for device in table.tables("device")),
         units=tuple(_unit(unit) for unit in table.tables("unit")),
@@ -195,7 +195,8 @@ def _unit(table: Table) -> UnitMount:
     return mount
 
 
-def _tell_twice(report: Report, what: str, ids: Iterable[str]) -> None:
+def tell_twice(report: Report, what: str, ids: Iterable[str]) -> None:
+    """Note each that stands twice."""
     seen: set[str] = set()
     for id in ids:
         if id and id in seen:

@@ -202,7 +202,7 @@ CODES = (
     Code(
         "SETTING_INVALID",
         "A setting of the plugin is not what it expects.",
-        "correct it in `settings` of payload.toml, and build the payload again",
+        "correct it in `settings` of payload.toml, or in the file of `settings` under [workers]",
     ),
     Code(
         "UNIT_TAKEN",

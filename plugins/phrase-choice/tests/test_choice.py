@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nondum_language_model.question import (
+from nondum_phrase_choice.choice import (
     LONGEST_SAID,
     NO_SENTENCE,
     AnswerRefused,

@@ -8,6 +8,7 @@ no PDDL and no sentence. Whatever it says is checked here, though its output is 
 from __future__ import annotations
 
 import json
+import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -96,6 +97,19 @@ def sentence(answer: str, phrases: Phrases) -> str | None:
         case {"goal": {"pattern": str(words), "slots": dict(slots)}} if words in phrases:
             return _filled(words, slots, phrases[words])
     raise AnswerRefused(f"not among what was offered: {answer[:100]!r}")
+
+
+def translation(
+    words: str, answer: str, phrases: Phrases, log: logging.Logger
+) -> dict[str, str] | None:
+    """What a component answers to `translate_goal`; what was said and answered is logged."""
+    log.info("%r was said, the model answered %r", words, answer)
+    try:
+        meant = sentence(answer, phrases)
+    except AnswerRefused as refused:
+        log.warning("the answer is not taken: %s", refused)
+        return None
+    return None if meant is None else {"words": meant}
 
 
 def _filled(words: str, said: Mapping[str, Any], slots: Mapping[str, Iterable[str]]) -> str:
