@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class Settings:
     """How the model that is shown is run."""
 
-    threads: int = 4
-    """Threads that llama.cpp may use."""
+    threads: int = 0
+    """Threads that llama.cpp may use; 0: one for each processor but one."""
     context_tokens: int = 4096
     """Of what can be said and of the answer together; each takes memory."""
     answer_tokens: int = 256
@@ -19,7 +19,7 @@ class Settings:
     """For an answer: then it is broken off. The host waits `planning.translate_s`."""
 
     def __post_init__(self) -> None:
-        if self.threads < 1 or self.answer_tokens < 32 or self.seconds <= 0:
-            raise ValueError("threads must be at least 1, answer_tokens 32, seconds above 0")
+        if self.threads < 0 or self.answer_tokens < 32 or self.seconds <= 0:
+            raise ValueError("threads must be at least 0, answer_tokens 32, seconds above 0")
         if self.context_tokens < 2 * self.answer_tokens:
             raise ValueError("context_tokens must be at least twice answer_tokens")

@@ -109,7 +109,7 @@ def test_other_weights_are_taken(worker: Any, models: list[Path], tmp_path: Path
     assert caught.value.code == "WEIGHTS_UNREADABLE"
 
 
-@pytest.mark.parametrize("settings", [{"threads": 0}, {"context_tokens": 300}, {"seconds": 0}])
+@pytest.mark.parametrize("settings", [{"threads": -1}, {"context_tokens": 300}, {"seconds": 0}])
 def test_wrong_settings_are_refused(
     worker: Any, models: list[Path], settings: dict[str, Any]
 ) -> None:

@@ -76,6 +76,21 @@ def test_hog_is_killed_and_counted(cgroups: Cgroups) -> None:
 
 
 @REAL
+@pytest.mark.parametrize(("first_mb", "then_mb", "status"), [(16, 128, 0), (128, 16, -9)])
+def test_limits_of_a_cgroup_are_raised_and_lowered(
+    cgroups: Cgroups, first_mb: int, then_mb: int, status: int
+) -> None:
+    """As those of a spare worker, which has the usual ones until a component takes it."""
+    cgroup = cgroups.make("spare", CgroupLimits(memory_mb=first_mb))
+    cgroup.limit(CgroupLimits(memory_mb=then_mb))
+    process = begin("import sys\nsys.stdin.read(1)\nheld = bytearray(64 << 20)\n")
+    cgroup.add(process.pid)
+    let_go(process)
+    assert process.wait() == status
+    assert cgroup.end()
+
+
+@REAL
 def test_children_that_were_there_before_come_along(cgroups: Cgroups) -> None:
     code = "import subprocess,sys\np=subprocess.Popen(['sleep','60'])\nprint(p.pid,flush=True)\n"
     process = subprocess.Popen(

@@ -114,7 +114,8 @@ def _made(hierarchy: Mounted, owner: str) -> Path | None:
 
 def _settings(limits: CgroupLimits) -> Iterator[tuple[str, str, int]]:
     size = limits.memory_mb * MEGABYTE
-    # The sum of memory and swap may never be below the memory, so what it was before matters.
+    # The sum of memory and swap may never be below the memory, whatever both were before.
+    yield "memory", "memory.memsw.limit_in_bytes", -1
     yield "memory", "memory.limit_in_bytes", size
     yield "memory", "memory.memsw.limit_in_bytes", size
     yield "pids", "pids.max", limits.tasks
