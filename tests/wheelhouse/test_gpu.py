@@ -49,33 +49,64 @@ def nvml(*devices: tuple[int, int], has_driver: bool = True) -> ModuleType:
     return module
 
 
-@pytest.fixture
-def no_board(tmp_path: Path) -> Path:
-    """A machine that is no board has no such file."""
-    return tmp_path / "none"
+def machine(root: Path, **files: str) -> Path:
+    """One whose kernel and system say this; `__` stands for `/`, and an ending is left out."""
+    for name, text in files.items():
+        path = root / name.replace("__", "/").replace("icd", ".icd")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return root
 
 
-def test_a_board_that_shares_memory_answers_with_the_systems(tmp_path: Path) -> None:
-    model = tmp_path / "model"
-    model.write_bytes(b"NVIDIA Jetson Orin Nano Developer Kit\0")
-    assert gpu.look(1234, 8000, model=model) == Gpu(1234, 8000, is_shared=True)
+JETSON = {"proc__device-tree__model": "NVIDIA Jetson Orin Nano Developer Kit\0"}
+PI = {"proc__device-tree__model": "Raspberry Pi 4 Model B Rev 1.5\0"}
+RADEON = {
+    "sys__class__drm__card1__device__vendor": "0x1002\n",
+    "sys__class__drm__card1__device__mem_info_vram_total": f"{8000 * MB}\n",
+    "sys__class__drm__card1__device__mem_info_vram_used": f"{3000 * MB}\n",
+    "dev__kfd": "",
+}
+NVIDIA = {"proc__driver__nvidia__version": "NVRM version: NVIDIA UNIX x86_64 Kernel Module"}
+INTEL = {"etc__OpenCL__vendors__intelicd": "libigdrcl.so", "dev__dri__renderD128": ""}
 
 
-def test_another_machine_is_never_answered_for_by_the_systems_memory(no_board: Path) -> None:
-    found = gpu.look(-1, -1, model=no_board)
-    assert found is None or (found.free_mb > 0 and not found.is_shared)
+@pytest.fixture(autouse=True)
+def no_nvml(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pynvml", nvml(has_driver=False))
+
+
+@pytest.mark.parametrize(
+    ("files", "found"),
+    [
+        ({}, None),
+        (JETSON, Gpu(1234, 8000, is_shared=True, kinds=("cuda",))),
+        (PI, Gpu(1234, 8000, is_shared=True, kinds=("v3d",))),
+        (RADEON, Gpu(5000, 8000, kinds=("rocm",))),
+        ({**RADEON, "dev__kfd": None}, None),
+        (INTEL, Gpu(1234, 8000, is_shared=True, kinds=("opencl",))),
+        ({**RADEON, **INTEL}, Gpu(5000, 8000, kinds=("rocm", "opencl"))),
+        ({**INTEL, "dev__dri__renderD128": None}, None),
+        ({"etc__OpenCL__vendors__poclicd": "", "dev__dri__renderD128": ""}, None),
+        ({**RADEON, "sys__class__drm__card1__device__mem_info_vram_used": "much"}, None),
+    ],
+)
+def test_what_a_machine_says_is_a_gpu_of_its_kinds(
+    tmp_path: Path, files: dict[str, str | None], found: Gpu | None
+) -> None:
+    there = {name: text for name, text in files.items() if text is not None}
+    assert gpu.look(1234, 8000, root=machine(tmp_path, **there)) == found
 
 
 def test_one_payload_finds_what_the_emptiest_gpu_has(
-    monkeypatch: pytest.MonkeyPatch, no_board: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "pynvml", nvml((100, 4000), (3000, 8000)))
-    assert gpu.look(0, 0, model=no_board) == Gpu(3000, 12000)
+    assert gpu.look(0, 0, root=machine(tmp_path, **NVIDIA)) == Gpu(3000, 12000, kinds=("cuda",))
 
 
 @pytest.mark.parametrize("module", [nvml(), nvml((1, 1), has_driver=False)])
 def test_no_device_and_no_driver_are_no_gpu(
-    monkeypatch: pytest.MonkeyPatch, no_board: Path, module: ModuleType
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, module: ModuleType
 ) -> None:
     monkeypatch.setitem(sys.modules, "pynvml", module)
-    assert gpu.look(0, 0, model=no_board) is None
+    assert gpu.look(0, 0, root=machine(tmp_path, **NVIDIA)) is None

@@ -108,6 +108,16 @@ WRONG = {
     "unknown-key": ("MANIFEST_KEY", ":3", PLAIN.replace("summary", "sumary")),
     "unknown-table": ("MANIFEST_KEY", "", PLAIN + "[require]\n"),
     "unknown-in-requires": ("MANIFEST_KEY", ":10", PLAIN.replace("memory_mb", "memory-mb")),
+    "gpu-of-no-kind": (
+        "MANIFEST_VALUE",
+        ":12",
+        PLAIN.replace("memory_mb = 50", 'memory_mb = 50\n[requires.gpu]\nkind = "metal"'),
+    ),
+    "unknown-in-gpu": (
+        "MANIFEST_KEY",
+        "",
+        PLAIN.replace("memory_mb = 50", "gpu = { memory = 50 }"),
+    ),
     "unknown-in-component": ("MANIFEST_KEY", ":15", PLAIN.replace("permissions", "permission")),
     "unknown-in-device": ("MANIFEST_KEY", ":21", PLAIN.replace("optional", "option")),
     "match-by-no-word": ("MANIFEST_VALUE", ":20", PLAIN.replace("SUBSYSTEM", "subsytem")),

@@ -54,6 +54,13 @@ def test_memory_in_use_is_not_counted_twice() -> None:
     assert told(Requires(memory_mb=500), Memory(500, promised=Promised(700, 0))) == []
 
 
+@pytest.mark.parametrize(("kind", "codes"), [("", []), ("cuda", []), ("v3d", ["NO_GPU_KIND"])])
+def test_gpu_of_another_kind_will_not_do(kind: str, codes: list[str]) -> None:
+    have = Memory(PLENTY, Gpu(4000, 4000, kinds=("cuda", "opencl")))
+    needs = Requires(gpu_memory_mb=1000, gpu_kind=kind)
+    assert [problem.code for problem in memory.problems(needs, have, "org.example.x")] == codes
+
+
 def test_only_the_sum_of_all_gpu_memory_reservations_is_known() -> None:
     """What is free may be what others have not taken yet, and what they have taken is not free."""
     unused = Memory(PLENTY, Gpu(4000, 4000), Promised(gpu_memory_mb=3000))

@@ -81,14 +81,15 @@ def _confinement() -> Iterator[Row]:
 
 
 def _gpu(root: Path) -> str:
-    found = gpu.look(0, 0)
+    found = gpu.look(0, 0, root=root)
     if found is None:
         memory = "none that is known of"
     elif found.is_shared:
         memory = "the system's memory"
     else:
         memory = f"{found.free_mb} of {found.total_mb} MB free"
-    return f"{memory}; drivers: {hardware.graphics(root)}"
+    kinds = ", ".join(found.kinds) if found is not None and found.kinds else "none"
+    return f"{memory}; kinds: {kinds}; drivers: {hardware.graphics(root)}"
 
 
 def _disk(config: HostConfig, root: Path) -> Iterator[Row]:

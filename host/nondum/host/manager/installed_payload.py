@@ -14,6 +14,7 @@ from nondum.host.jobs.prepared import Prepared
 from nondum.host.manager.headroom import Needs
 from nondum.host.manager.state_folders import Folders
 from nondum.host.workers.spec import Limits, WorkerSpec
+from nondum.sdk.codec.values import from_plain
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.data import FOLDER
 from nondum.wheelhouse.format.signatures import Grant
@@ -63,7 +64,7 @@ class InstalledPayload:
             Needs.parse(told["needs"]),
             Grant.parse(told["grant"]),
             tuple(told["goals"]),
-            Gpu(**told["gpu"]) if told["gpu"] else None,
+            from_plain(Gpu, told["gpu"]) if told["gpu"] else None,
             told["fresh"],
             not told["uncompiled"],
             told,

@@ -12,7 +12,10 @@ from nondum.host.workers.spec import WorkerSpec
 
 NODES: Mapping[str, tuple[str, ...]] = {
     "audio": ("/dev/snd",),
-    "gpu": ("/dev/dri", "/dev/kfd", "/dev/nvidia*"),
+    "gpu": (
+        *("/dev/dri", "/dev/kfd", "/dev/nvidia*"),
+        *("/dev/nvhost-*", "/dev/nvgpu", "/dev/nvmap", "/dev/nvsciipc"),  # a Jetson's
+    ),
 }
 """Device nodes that a permission stands for."""
 INSTRUMENTS = (

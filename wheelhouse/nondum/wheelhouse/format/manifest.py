@@ -19,6 +19,8 @@ from nondum.wheelhouse.format.limits import WorkerLimits
 from nondum.wheelhouse.format.tables import Form, Report, Table
 
 NAME = "payload.toml"
+GPU_KINDS = ("cuda", "opencl", "rocm", "v3d")
+"""Ways in which programs use a GPU: NVIDIA's, Khronos', AMD's, and a Raspberry Pi's."""
 PERMISSIONS = ("audio", "devices", "gpu", "network")
 """What components may ask for."""
 GOALS = "goals"
@@ -29,6 +31,7 @@ GRANTABLE = (*PERMISSIONS, GOALS, DATA)
 """What a role may give."""
 
 PAYLOAD_ID = Form(names.PAYLOAD_ID, "a reverse domain name like org.example.blinker")
+_GPU_KIND = Form(re.compile(f"({'|'.join(GPU_KINDS)})?"), f"one of {', '.join(GPU_KINDS)}")
 COMPONENT_ID = Form(
     names.COMPONENT_ID, "a component's id: lower-case letters, digits and single hyphens"
 )
@@ -50,6 +53,8 @@ class Requires:
     memory_mb: int = 0
     """Of all its components together: at least the sum of what each of them asks for."""
     gpu_memory_mb: int = 0
+    gpu_kind: str = ""
+    """Of `GPU_KINDS`; empty: any GPU will do, if one is asked for."""
     confinement: Level = Level.NONE
     """The least level that its workers may run at."""
     alone: bool = False
@@ -136,11 +141,16 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
 
 
 def _requires(table: Table) -> Requires:
+    gpu = table.table("gpu")
+    kind = gpu.text("kind", _GPU_KIND, default="")
+    memory_mb = gpu.integer("memory_mb", table.integer("gpu_memory_mb", 0))
+    gpu.close()
     requires = Requires(
         python=table.text("python", default=""),
         disk_mb=table.integer("disk_mb", 0),
         memory_mb=table.integer("memory_mb", 0),
-        gpu_memory_mb=table.integer("gpu_memory_mb", 0),
+        gpu_memory_mb=memory_mb,
+        gpu_kind=kind,
         confinement=table.parsed("confinement", confinement.parse, Level.NONE),
         alone=table.flag("alone"),
     )

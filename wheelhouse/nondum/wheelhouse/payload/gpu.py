@@ -1,24 +1,31 @@
-"""What memory GPUs have: what NVML says, or the system's own where a GPU shares it.
+"""The GPU of a machine: how programs can use it, and what memory it has.
 
 NVML is asked through nvidia-ml-py, and only by processes that end soon: it keeps memory and
-threads.
+threads, and may hang. Where a machine has several, the first of these is told: NVIDIA's, AMD's,
+another one with OpenCL, which shares the system's memory.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from nondum.sdk.frozen import frozen
 
-MODEL = Path("/proc/device-tree/model")
-SHARING = ("Jetson", "Raspberry Pi")
-"""Boards whose GPU uses the system's memory, and which have no NVML."""
+ROOT = Path("/")
+SHARING = {"Jetson": ("cuda",), "Raspberry Pi": ("v3d",)}
+"""Boards whose GPU uses the system's memory, and which have no NVML → its kinds."""
 _MB = 1024 * 1024
+_AMD = "0x1002"
+"""The vendor's number (PCI)."""
+_NO_GPU = ("pocl",)
+"""Drivers of OpenCL that compute on the processor."""
 
 
 @frozen
 class Gpu:
-    """The memory of a host's GPUs."""
+    """The memory of a host's GPUs, and their kinds."""
 
     free_mb: int
     """Of the GPU that has most of it: what one payload may find."""
@@ -26,26 +33,37 @@ class Gpu:
     """Of all of them, used or not."""
     is_shared: bool = False
     """Whether it is the system's own memory."""
+    kinds: tuple[str, ...] = ()
+    """Of `manifest.GPU_KINDS`."""
 
 
-def look(system_free_mb: int, system_total_mb: int, *, model: Path = MODEL) -> Gpu | None:
+def look(system_free_mb: int, system_total_mb: int, *, root: Path = ROOT) -> Gpu | None:
     """The GPUs of this machine; None where none is known of."""
-    if shares_memory(_text(model)):
-        return Gpu(system_free_mb, system_total_mb, is_shared=True)
-    return _asked_of_nvml()
+    shared = Gpu(system_free_mb, system_total_mb, is_shared=True)
+    model = _text(root / "proc/device-tree/model")
+    if (kinds := kinds_of_board(model)) is not None:
+        found: Gpu | None = replace(shared, kinds=kinds)
+    else:
+        found = _asked_of_nvml(root) or _told_by_amdgpu(root)
+    if not _has_opencl(root):
+        return found
+    found = found or shared
+    return replace(found, kinds=(*found.kinds, "opencl"))
 
 
-def shares_memory(model: str) -> bool:
-    """Whether a board's model is one whose GPU uses the system's memory.
+def kinds_of_board(model: str) -> tuple[str, ...] | None:
+    """The kinds of a board's GPU that uses the system's memory; None: it is no such board.
 
-    >>> shares_memory("NVIDIA Jetson Orin Nano Developer Kit"), shares_memory("")
-    (True, False)
+    >>> kinds_of_board("NVIDIA Jetson Orin Nano Developer Kit"), kinds_of_board("")
+    (('cuda',), None)
     """
-    return any(name in model for name in SHARING)
+    return next((kinds for name, kinds in SHARING.items() if name in model), None)
 
 
-def _asked_of_nvml() -> Gpu | None:
-    import pynvml  # not by those that only judge what others saw
+def _asked_of_nvml(root: Path) -> Gpu | None:
+    if not (root / "proc/driver/nvidia").exists():
+        return None
+    import pynvml  # takes 30 ms, which a payload would wait for
 
     try:
         pynvml.nvmlInit()
@@ -53,14 +71,43 @@ def _asked_of_nvml() -> Gpu | None:
         every = [pynvml.nvmlDeviceGetMemoryInfo(handle) for handle in handles]
     except pynvml.NVMLError:  # no driver, or no device
         return None
+    return _together(((int(one.free), int(one.total)) for one in every), "cuda")
+
+
+def _told_by_amdgpu(root: Path) -> Gpu | None:
+    """What the driver tells in sysfs (kernel documentation, "AMDGPU driver", memory); of use to
+    programs where there is the device node of ROCm."""
+    if not (root / "dev/kfd").exists():
+        return None
+    return _together(_memory_of_amd(root), "rocm")
+
+
+def _memory_of_amd(root: Path) -> Iterator[tuple[int, int]]:
+    for device in sorted((root / "sys/class/drm").glob("card[0-9]*/device")):
+        used, total = (_text(device / f"mem_info_vram_{what}") for what in ("used", "total"))
+        if _text(device / "vendor") == _AMD and used.isdecimal() and total.isdecimal():
+            yield int(total) - int(used), int(total)
+
+
+def _together(each: Iterator[tuple[int, int]], kind: str) -> Gpu | None:
+    """Several of one kind: free and all bytes of each."""
+    every = list(each)
     if not every:
         return None
-    free, total = max(int(one.free) for one in every), sum(int(one.total) for one in every)
-    return Gpu(free // _MB, total // _MB)
+    free, total = max(free for free, _ in every), sum(total for _, total in every)
+    return Gpu(free // _MB, total // _MB, kinds=(kind,))
+
+
+def _has_opencl(root: Path) -> bool:
+    """Whether a driver of OpenCL for a GPU is installed (cl_khr_icd), and a GPU there to use."""
+    drivers = [path.stem for path in (root / "etc/OpenCL/vendors").glob("*.icd")]
+    has_driver = any(not name.startswith(_NO_GPU) for name in drivers)
+    nodes = ("dri/renderD*", "nvidia[0-9]*", "kfd")
+    return has_driver and any(any((root / "dev").glob(pattern)) for pattern in nodes)
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8", errors="replace").rstrip("\0")
+        return path.read_text(encoding="utf-8", errors="replace").strip("\0\n ")
     except OSError:
         return ""

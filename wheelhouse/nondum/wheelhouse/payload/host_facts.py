@@ -15,6 +15,7 @@ from packaging.tags import Tag
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.format.confinement import Level
 from nondum.wheelhouse.format.limits import WorkerLimits
+from nondum.wheelhouse.format.manifest import GPU_KINDS
 from nondum.wheelhouse.format.target import Target
 from nondum.wheelhouse.payload import memory
 from nondum.wheelhouse.payload.gpu import Gpu
@@ -93,7 +94,7 @@ def of_target(target: Target) -> HostFacts:
             *tags.compatible_tags(version, interpreter, platforms),
         ),
         free_disk_mb=_PLENTY_MB,
-        memory=Memory(_PLENTY_MB, Gpu(_PLENTY_MB, _PLENTY_MB)),
+        memory=Memory(_PLENTY_MB, Gpu(_PLENTY_MB, _PLENTY_MB, kinds=GPU_KINDS)),
         confinement=Level.SANDBOXED,
         nondum=nondum_version(),
     )

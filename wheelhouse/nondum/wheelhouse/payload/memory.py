@@ -82,7 +82,7 @@ class Memory:
 
         >>> after = Memory(1000, Gpu(3000, 4000)).with_freed(100, 1500)
         >>> after.free_mb, after.gpu
-        (1100, Gpu(free_mb=4000, total_mb=4000, is_shared=False))
+        (1100, Gpu(free_mb=4000, total_mb=4000, is_shared=False, kinds=()))
         """
         gpu = self.gpu
         if gpu is None:
@@ -93,7 +93,8 @@ class Memory:
 
 
 def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem]:
-    """What there is too little of for a payload: NO_MEMORY, NO_GPU_MEMORY."""
+    """What there is too little of for a payload, or not at all: NO_MEMORY, NO_GPU_KIND,
+    NO_GPU_MEMORY."""
     left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb)
     if needs.memory_mb > left_mb:
         why, fix = _because(have.promised.unused_mb, have.promised.holders)
@@ -105,7 +106,17 @@ def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem
             have=f"{left_mb} MB",
             fix=fix or "free some memory, or use another host",
         )
-    if needs.gpu_memory_mb > gpu_left_mb:
+    kinds = have.gpu.kinds if have.gpu is not None else ()
+    if needs.gpu_kind and needs.gpu_kind not in kinds:
+        yield Problem(
+            "NO_GPU_KIND",
+            f"there is no GPU that programs use by {needs.gpu_kind}",
+            where=payload_id,
+            need=f"a GPU of kind {needs.gpu_kind}",
+            have=", ".join(kinds) or "none",
+            fix="use another host",
+        )
+    elif needs.gpu_memory_mb > gpu_left_mb:
         why, fix = _because(have.promised.gpu_memory_mb, have.promised.gpu_holders)
         yield Problem(
             "NO_GPU_MEMORY",

@@ -61,6 +61,11 @@ CODES = (
         "see `nondum status` for what is",
     ),
     Code(
+        "NO_GPU_KIND",
+        "The host has no GPU of the kind that the payload needs.",
+        "use another host",
+    ),
+    Code(
         "NO_GPU_MEMORY",
         "There is too little GPU memory, or no GPU.",
         "pull a payload that uses the GPU, or use another host",
