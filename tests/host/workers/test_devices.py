@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import os
 import signal
@@ -69,6 +70,16 @@ async def test_device_is_granted_and_withdrawn(tested: WorkersUnderTest) -> None
     assert await node(tested) == seen(tested)
     await tested.workers.detach("guest", "line")
     assert await node(tested) == "none"
+
+
+async def test_behaviour_begins_once_what_was_granted_before_is_there(
+    tested: WorkersUnderTest,
+) -> None:
+    await guest(tested)
+    granting = asyncio.create_task(tested.workers.attach("guest", "line", "/dev/zero", {}))
+    await asyncio.sleep(0)  # it has begun
+    assert await node(tested) == seen(tested)
+    await granting
 
 
 async def test_device_that_is_being_pulled_is_not_told_as_another(tested: WorkersUnderTest) -> None:

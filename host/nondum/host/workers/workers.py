@@ -8,6 +8,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
+from weakref import WeakValueDictionary
 
 from nondum.host.core.events.event import Emit, Event
 from nondum.host.core.events.facts import FactKnown, StreamFlowing
@@ -72,6 +73,8 @@ class Workers:
         self._supervisors: dict[str, Supervisor] = {}
         self._extra_workers = ExtraWorkers()
         self._devices: dict[str, Granted] = {}
+        self._granting = WeakValueDictionary[str, asyncio.Lock]()
+        """Component → held while it is granted a device, or shown data."""
         self._shown: dict[tuple[str, str], dict[str, Mapping[str, Any]]] = {}
         """Component and payload → need → the data that it is shown for it."""
         self._mounts: Mapping[str, Any] = {}
@@ -248,11 +251,12 @@ class Workers:
         Another worker that has it, and is being stopped, is waited for.
         """
         nodes = [{"node": n, "properties": dict(p)} for n, p in ((node, properties), *others)]
-        for each in nodes:
-            await self._extra_workers.released(str(each["node"]))
-        device = {**nodes[0], "nodes": nodes}
-        self._devices.setdefault(component, {})[need] = device
-        await self._tell_worker(component, lambda worker: worker.attach(need, device))
+        async with self._granting.setdefault(component, asyncio.Lock()):
+            for each in nodes:
+                await self._extra_workers.released(str(each["node"]))
+            device = {**nodes[0], "nodes": nodes}
+            self._devices.setdefault(component, {})[need] = device
+            await self._tell_worker(component, lambda worker: worker.attach(need, device))
 
     async def detach(self, component: str, need: str) -> None:
         """Withdraw a device."""
@@ -272,7 +276,8 @@ class Workers:
         supervisor = self._supervisors.get(component)
         if supervisor is not None and supervisor.spec.payload == payload:
             body = {"need": need, "shown": data}
-            await self._tell_worker(component, lambda worker: worker.link.request("data", body))
+            async with self._granting.setdefault(component, asyncio.Lock()):
+                await self._tell_worker(component, lambda worker: worker.link.request("data", body))
 
     def claims(self, component: str) -> tuple[FactKnown | StreamFlowing, ...]:
         """What a component's worker says is so now: the news of it that still hold.
@@ -417,6 +422,8 @@ class Workers:
         sent = [[p, list(objects), value] for p, objects, value in values if value is not None]
         try:
             await self._extra_workers.left(call.component)  # two releases do not act together
+            async with self._granting.setdefault(call.component, asyncio.Lock()):
+                pass  # what it was granted before it was asked is there when it begins
             async with self.streams.wired(call.component, call.behaviour, call.arguments):
                 if call.is_halting:
                     call.end(RunState.HALTED, "halted before it began")

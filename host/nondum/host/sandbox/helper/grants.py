@@ -9,20 +9,30 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from nondum.host.sandbox.helper.privileged import privileged
+from nondum.host.sandbox.helper.privileged import Privileged, privileged
 from nondum.sdk.errors import NondumError
 
+TIMES = 4
+"""So often is a helper asked that does not answer in time: it may just be starting."""
+_NOT_YET = frozenset({"HELPER_BUSY", "HELPER_SILENT"})
 log = logging.getLogger(__name__)
 
 
-def reachable(component: str, need: str, node: str, user: int | None = None) -> str:
+def reachable(
+    component: str, need: str, node: str, user: int | None = None, by: Privileged | None = None
+) -> str:
     """The node of a granted device, or one that stands for it, for the daemon's user or that of a
-    worker. Blocks: not for the loop."""
-    try:
-        return str(privileged().put_node(component, need, Path(node), user))
-    except (NondumError, OSError) as error:  # the plugin will be told when it opens it
-        log.warning("%s of %s may not be opened: %s", need, component, error)
-        return node
+    worker; `by` is who makes it. Blocks, for a minute at most: not for the loop."""
+    by = by or privileged()
+    for left in reversed(range(TIMES)):
+        try:
+            return str(by.put_node(component, need, Path(node), user))
+        except (NondumError, OSError) as error:  # the plugin will be told when it opens it
+            log.warning("%s of %s may not be opened: %s", need, component, error)
+            is_answer = not isinstance(error, NondumError) or error.code not in _NOT_YET
+            if not left or is_answer or not Path(node).exists():
+                break
+    return node
 
 
 def withdrawn(component: str, need: str) -> None:
