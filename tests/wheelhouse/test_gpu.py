@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,3 +111,49 @@ def test_no_device_and_no_driver_are_no_gpu(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pynvml", module)
     assert gpu.look(0, 0, root=machine(tmp_path, **NVIDIA)) is None
+
+
+# Asked by a process that stays, in a child
+
+ANSWERS = """
+class NVMLError(Exception): pass
+class Info: free, total = 3 << 30, 8 << 30
+def nvmlInit(): pass
+def nvmlDeviceGetCount(): return 1
+def nvmlDeviceGetHandleByIndex(number): return number
+def nvmlDeviceGetMemoryInfo(handle): return Info
+"""
+HANGS = "import time\ntime.sleep(3600)\n"
+CRASHES = "import os\nos.abort()\n"
+
+
+@pytest.mark.parametrize(
+    ("module", "seconds", "found"),
+    [
+        (ANSWERS, 60.0, Gpu(3072, 8192, kinds=("cuda",))),
+        (HANGS, 0.2, None),
+        (CRASHES, 60.0, None),
+    ],
+    ids=["answers", "hangs", "crashes"],
+)
+def test_nvml_is_asked_in_a_child_by_a_process_that_stays(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    module: str,
+    seconds: float,
+    found: Gpu | None,
+) -> None:
+    (tmp_path / "pynvml.py").write_text(module)
+    path = (str(tmp_path), *sys.path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+    root = machine(tmp_path, **NVIDIA)
+    assert gpu.look_aside(0, 0, root=root, seconds=seconds) == found
+
+
+def test_no_child_is_started_where_nvml_is_not_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", "/nonexistent")
+    assert gpu.look_aside(1234, 8000, root=machine(tmp_path, **INTEL)) == Gpu(
+        1234, 8000, is_shared=True, kinds=("opencl",)
+    )

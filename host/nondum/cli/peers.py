@@ -105,9 +105,14 @@ def _compute(compute: Row) -> str:
         str(compute.get("machine", "")),
         f"{compute.get('processors', '?')} processors",
         f"{compute.get('memory_mb', '?')} MB",
-        f"GPU {gpu} MB" if gpu else "no GPU",
+        f"GPU {gpu} MB{_kinds(compute)}" if gpu else "no GPU",
     ]
     return _listed(words)
+
+
+def _kinds(compute: Row) -> str:
+    kinds = compute.get("gpu_kinds")
+    return f" ({', '.join(map(str, kinds))})" if isinstance(kinds, list) and kinds else ""
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -134,6 +134,15 @@ def test_host_with_more_memory_is_asked_first() -> None:
     assert order(parcel("NO_MEMORY"), small, large) == ["tower", "mule"]
 
 
+def test_host_with_another_kind_of_gpu_is_asked_first_when_that_is_lacking() -> None:
+    roomy = peer("mule", memory_mb=64_000, gpu_kinds=["opencl"])
+    cuda, odd = peer("tower", gpu_kinds=["cuda"]), peer("odd", gpu_kinds=7)
+    here = {**HERE, "gpu_kinds": ["opencl"]}
+    first, *others = ranked((roomy, odd, cuda), parcel("NO_GPU_KIND"), here)
+    assert first.host == "tower"
+    assert [candidate.host for candidate in others] == ["mule", "odd"]
+
+
 def test_host_with_a_gpu_is_asked_first_when_one_is_lacking() -> None:
     roomy, gpu = peer("mule", memory_mb=64_000), peer("tower", gpu_memory_mb=8_000)
     assert order(parcel("NO_GPU_MEMORY"), roomy, gpu) == ["tower", "mule"]
@@ -152,7 +161,9 @@ def test_pin_leaves_one_host() -> None:
     assert order(one, peer("tower")) == []
 
 
-words = st.sampled_from(["place", "memory_mb", "gpu_memory_mb", "machine", "python", "disk_mb"])
+words = st.sampled_from(
+    ["place", "memory_mb", "gpu_memory_mb", "gpu_kinds", "machine", "python", "disk_mb"]
+)
 values = st.one_of(st.none(), st.booleans(), st.floats(), st.integers(), st.text(max_size=3))
 
 

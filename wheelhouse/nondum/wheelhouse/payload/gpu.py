@@ -1,26 +1,34 @@
 """The GPU of a machine: how programs can use it, and what memory it has.
 
-NVML is asked through nvidia-ml-py, and only by processes that end soon: it keeps memory and
-threads, and may hang. Where a machine has several, the first of these is told: NVIDIA's, AMD's,
-another one with OpenCL, which shares the system's memory.
+NVML is asked through nvidia-ml-py, and only by processes that end soon, or in a child
+(`look_aside`): it keeps memory and threads, and may hang. Where a machine has several, the first of
+these is told: NVIDIA's, AMD's, another one with OpenCL, which shares the system's memory.
 """
 
 from __future__ import annotations
 
+import json
+import logging
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from nondum.sdk.codec.values import from_plain, to_plain
 from nondum.sdk.frozen import frozen
 
 ROOT = Path("/")
 SHARING = {"Jetson": ("cuda",), "Raspberry Pi": ("v3d",)}
 """Boards whose GPU uses the system's memory, and which have no NVML → its kinds."""
+ASIDE_S = 20.0
+"""How long a child is waited for that asks NVML: a driver that wakes a GPU takes seconds."""
 _MB = 1024 * 1024
 _AMD = "0x1002"
 """The vendor's number (PCI)."""
 _NO_GPU = ("pocl",)
 """Drivers of OpenCL that compute on the processor."""
+log = logging.getLogger(__name__)
 
 
 @frozen
@@ -51,6 +59,24 @@ def look(system_free_mb: int, system_total_mb: int, *, root: Path = ROOT) -> Gpu
     return replace(found, kinds=(*found.kinds, "opencl"))
 
 
+def look_aside(
+    system_free_mb: int, system_total_mb: int, *, root: Path = ROOT, seconds: float = ASIDE_S
+) -> Gpu | None:
+    """The same, for a process that stays: where NVML would be asked, a child asks it. Blocks; a
+    child that hangs or crashes is told of in the log."""
+    if not _has_nvidia(root):
+        return look(system_free_mb, system_total_mb, root=root)
+    asked = (str(root), str(system_free_mb), str(system_total_mb))
+    command = (sys.executable, "-P", "-m", "nondum.wheelhouse.payload.gpu", *asked)
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=seconds, check=True)
+    except (OSError, subprocess.SubprocessError) as error:
+        log.warning("NVML does not say what GPU there is: %s", error)
+        return None
+    told = json.loads(done.stdout)
+    return from_plain(Gpu, told) if told is not None else None
+
+
 def kinds_of_board(model: str) -> tuple[str, ...] | None:
     """The kinds of a board's GPU that uses the system's memory; None: it is no such board.
 
@@ -61,7 +87,7 @@ def kinds_of_board(model: str) -> tuple[str, ...] | None:
 
 
 def _asked_of_nvml(root: Path) -> Gpu | None:
-    if not (root / "proc/driver/nvidia").exists():
+    if not _has_nvidia(root):
         return None
     import pynvml  # takes 30 ms, which a payload would wait for
 
@@ -72,6 +98,10 @@ def _asked_of_nvml(root: Path) -> Gpu | None:
     except pynvml.NVMLError:  # no driver, or no device
         return None
     return _together(((int(one.free), int(one.total)) for one in every), "cuda")
+
+
+def _has_nvidia(root: Path) -> bool:
+    return (root / "proc/driver/nvidia").exists()
 
 
 def _told_by_amdgpu(root: Path) -> Gpu | None:
@@ -111,3 +141,8 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8", errors="replace").strip("\0\n ")
     except OSError:
         return ""
+
+
+if __name__ == "__main__":  # the child of `look_aside`
+    _found = look(int(sys.argv[2]), int(sys.argv[3]), root=Path(sys.argv[1]))
+    sys.stdout.write(json.dumps(to_plain(_found)))

@@ -6,7 +6,7 @@ is known; of GPU memory only what all workers use together.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -138,11 +138,12 @@ def _because(promised_mb: int, holders: Sequence[str]) -> tuple[str, str]:
     return f", since {promised_mb} MB are promised to {names}", fix
 
 
-def look() -> Memory:
-    """This machine's memory, of which nothing is known to be promised."""
+def look(gpu_look: Callable[[int, int], Gpu | None] = gpu.look) -> Memory:
+    """This machine's memory, of which nothing is known to be promised. A process that stays gives
+    `gpu.look_aside`."""
     found = _looked_up()
     free_mb = found["MemAvailable"]
-    return Memory(free_mb, gpu.look(free_mb, found["MemTotal"]))
+    return Memory(free_mb, gpu_look(free_mb, found["MemTotal"]))
 
 
 def free_memory_mb() -> int:

@@ -27,6 +27,7 @@ OTHERS_MAY_FIT = frozenset(
         "DISK_FULL",
         "LOCK_INCOMPLETE",
         "NONDUM_VERSION",
+        "NO_GPU_KIND",
         "NO_GPU_MEMORY",
         "NO_MEMORY",
         "PYTHON_VERSION",
@@ -168,10 +169,21 @@ def _another(*names: str) -> Callable[[Compute, Compute], bool]:
     return lambda here, there: any(there.get(name) != here.get(name) for name in names)
 
 
+def _has_other_gpu(here: Compute, there: Compute) -> bool:
+    """Whether a peer has a kind of GPU that this host has not."""
+    return bool(_kinds(there) - _kinds(here))
+
+
+def _kinds(compute: Compute) -> frozenset[str]:
+    told = compute.get("gpu_kinds")
+    return frozenset(map(str, told)) if isinstance(told, list | tuple) else frozenset()
+
+
 _BETTER: Mapping[str, Callable[[Compute, Compute], bool]] = {
     "DISK_FULL": _more("disk_mb"),
     "LOCK_INCOMPLETE": _another("machine", "python"),
     "NONDUM_VERSION": _another("nondum"),
+    "NO_GPU_KIND": _has_other_gpu,
     "NO_GPU_MEMORY": _more("gpu_memory_mb"),
     "NO_MEMORY": _more("memory_mb"),
     "PYTHON_VERSION": _another("python"),
