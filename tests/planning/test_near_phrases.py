@@ -150,3 +150,35 @@ def distance(one: str, other: str) -> int:
 @pytest.mark.parametrize("sentence", ["please", "please please", "could you", "now now now"])
 def test_a_sentence_of_nothing_but_courtesies_stays_one(sentence: str) -> None:
     assert without_courtesies(words_of(sentence))
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["don\u2019t follow me", "dont follow me", "follow me through the hall, don\u2019t run"],
+)
+def test_negations_are_seen_however_they_are_written(sentence: str) -> None:
+    assert nearest(BOOK, sentence) == ()
+    with pytest.raises(GoalRefused) as refused:
+        BOOK.goal(sentence)
+    assert "is in it" in refused.value.problems[0].fix
+
+
+@pytest.mark.parametrize(
+    ("phrase", "said"),
+    [
+        ("go to the great dock 1", "go to the great dock 2"),
+        ("switch the great lamp on", "switch the great lamp off"),
+        ("activate the great pump", "deactivate the great pump"),
+        ("increase the pressure", "decrease the pressure"),
+        ("unlock the great door", "lock the great door"),
+        ("drive to the north end", "drive to the south end"),
+    ],
+)
+def test_numbers_and_opposites_are_no_slips(phrase: str, said: str) -> None:
+    one = book(replace(BASE, phrases=(Phrase(phrase, "(following self person)"),)), DETECTOR)
+    assert nearest(one, phrase.replace("the great", "the graet"))
+    assert nearest(one, said) == ()
+
+
+def test_longest_sentences_are_not_looked_at() -> None:
+    assert nearest(BOOK, "please " * 100_000) == ()

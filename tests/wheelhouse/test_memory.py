@@ -61,6 +61,15 @@ def test_gpu_of_another_kind_will_not_do(kind: str, codes: list[str]) -> None:
     assert [problem.code for problem in memory.problems(needs, have, "org.example.x")] == codes
 
 
+@pytest.mark.parametrize(("kind", "codes"), [("", ["NO_GPU_MEMORY"]), ("opencl", [])])
+def test_gpu_that_has_opencl_only_is_taken_by_who_asks_for_that(
+    kind: str, codes: list[str]
+) -> None:
+    have = Memory(PLENTY, Gpu(4000, 8000, is_shared=True, kinds=("opencl",)))
+    needs = Requires(gpu_memory_mb=1000, gpu_kind=kind)
+    assert [problem.code for problem in memory.problems(needs, have, "org.example.x")] == codes
+
+
 def test_only_the_sum_of_all_gpu_memory_reservations_is_known() -> None:
     """What is free may be what others have not taken yet, and what they have taken is not free."""
     unused = Memory(PLENTY, Gpu(4000, 4000), Promised(gpu_memory_mb=3000))

@@ -38,7 +38,7 @@ _TRIPLE = (float, float, float)
     type=click.IntRange(-1000, 1000),
     help="Higher goes first.",
 )
-@click.option("--yes", is_flag=True, help="Take a component's translation without asking.")
+@click.option("--yes", is_flag=True, help="Take courtesies and translations without asking.")
 @click.option("--wait", is_flag=True, help="Until it is reached, is held, or has no plan.")
 @click.option("--keep", is_flag=True, help="Keep words that mean nothing yet until they do.")
 @click.option(

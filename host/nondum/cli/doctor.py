@@ -49,6 +49,8 @@ def doctor(ctx: click.Context, user: bool, config_file: Path | None, board: bool
               nondum doctor network
     """
     if ctx.invoked_subcommand is not None:
+        if board:
+            raise click.UsageError("--board has no command behind it", ctx)
         return None
     from nondum.cli.examination.examination import examine
     from nondum.cli.examination.finding import is_well, row

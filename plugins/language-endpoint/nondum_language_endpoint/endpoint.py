@@ -84,13 +84,13 @@ class _Exchange:
         self._settings = settings
         self._url = urlsplit(settings.url)
         self._socket: socket.socket | None = None
+        self._is_over = False
 
     def run(self, request: bytes) -> bytes:
         """Blocks. Raises `BehaviourFailed`."""
         connection = self._connection()
         try:
-            connection.connect()
-            self._socket = connection.sock
+            self._connect(connection)
             path = f"{self._url.path.rstrip('/')}/chat/completions"
             connection.request("POST", path, request, self._headers())
             response = connection.getresponse()
@@ -102,7 +102,7 @@ class _Exchange:
             raise BehaviourFailed(f"its certificate: {error}", code="ENDPOINT_TLS") from error
         except http.client.HTTPException as error:
             raise _wrong(repr(error).encode()) from error
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # the latter of a name that is none
             told = f"{self._url.netloc.rpartition('@')[2]}: {error}"
             raise BehaviourFailed(told, code="ENDPOINT_UNREACHABLE") from error
         finally:
@@ -114,20 +114,38 @@ class _Exchange:
 
     def end(self) -> None:
         """Have a thread that still waits for the server wait no longer."""
+        self._is_over = True
         if self._socket is not None:
             with suppress(OSError):  # it has ended
                 self._socket.shutdown(socket.SHUT_RDWR)
 
+    def _connect(self, connection: http.client.HTTPConnection) -> None:
+        """Connect to the server, which proves itself; by sockets that `end` can shut."""
+        where = connection.host, connection.port
+        context = self._context() if self._url.scheme == "https" else None
+        found = socket.create_connection(where, self._settings.seconds)
+        connection.sock = self._socket = found
+        if context is not None:
+            secure = context.wrap_socket(
+                found, server_hostname=connection.host, do_handshake_on_connect=False
+            )
+            connection.sock = self._socket = secure
+            if not self._is_over:
+                secure.do_handshake()
+        if self._is_over:
+            raise OSError("it was too late")
+
     def _connection(self) -> http.client.HTTPConnection:
-        host, port, seconds = self._url.hostname or "", self._url.port, self._settings.seconds
-        if self._url.scheme == "http":
-            return http.client.HTTPConnection(host, port, timeout=seconds)
+        is_plain = self._url.scheme == "http"
+        kind = http.client.HTTPConnection if is_plain else http.client.HTTPSConnection
+        return kind(self._url.hostname or "", self._url.port, timeout=self._settings.seconds)
+
+    def _context(self) -> ssl.SSLContext:
         try:
-            context = ssl.create_default_context(cadata=self._settings.authority or None)
+            return ssl.create_default_context(cadata=self._settings.authority or None)
         except ssl.SSLError as error:
             told = f"`authority` in its settings is no certificate: {error}"
             raise BehaviourFailed(told, code="ENDPOINT_TLS") from error
-        return http.client.HTTPSConnection(host, port, timeout=seconds, context=context)
 
     def _headers(self) -> dict[str, str]:
         headers = {"Content-Type": "application/json", "Accept": "application/json"}

@@ -25,7 +25,11 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.url and not _is_web(self.url):
-            raise ValueError("url must begin with http:// or https:// and name a host")
+            raise ValueError("url must begin with http:// or https:// and name a host, in ASCII")
+        for name in ("key", "authority"):  # neither is told: it may be a secret
+            value = getattr(self, name)
+            if not value.isascii() or (name == "key" and not value.isprintable()):
+                raise ValueError(f"{name} must be ASCII, a key in one line")
         if self.answer_tokens < 32 or self.seconds <= 0:
             raise ValueError("answer_tokens must be at least 32, seconds above 0")
 
@@ -33,6 +37,8 @@ class Settings:
 def _is_web(url: str) -> bool:
     try:
         parts = urlsplit(url)
+        if not url.isascii() or not url.isprintable() or " " in url:
+            return False
         return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:  # the port is no number
         return False

@@ -71,11 +71,18 @@ def _serve(
 def _request(client: socket.socket) -> bytes:
     said = b""
     while b"\r\n\r\n" not in said:
-        said += client.recv(65_536)
+        said += _more(client)
     head, _, body = said.partition(b"\r\n\r\n")
     (length,) = (
         int(line[15:]) for line in head.split(b"\r\n") if line.startswith(b"Content-Length")
     )
     while len(body) < length:
-        body += client.recv(65_536)
+        body += _more(client)
     return head + b"\r\n\r\n" + body
+
+
+def _more(client: socket.socket) -> bytes:
+    said = client.recv(65_536)
+    if not said:
+        raise ConnectionResetError
+    return said

@@ -156,11 +156,27 @@ def test_server_that_drips_is_left_in_time(worker: Any, head: bytes) -> None:
             assert caught.value.code == "ENDPOINT_OVERDUE"
 
 
+def test_server_that_never_shakes_hands_is_left_in_time(worker: Any) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"https://127.0.0.1:{silent.getsockname()[1]}/v1"
+        bench = worker(PLUGIN, settings={"url": url, "seconds": 0.5})
+        with pytest.raises(WorkerFailed) as caught:
+            ask(bench)
+    assert caught.value.code == "ENDPOINT_OVERDUE"
+
+
 def test_server_that_is_not_there_is_told(worker: Any) -> None:
     with scripted(always(b"")) as gone:
         pass
     with pytest.raises(WorkerFailed) as caught:
         ask(begin(worker, gone))
+    assert caught.value.code == "ENDPOINT_UNREACHABLE"
+
+
+def test_host_name_that_is_none_is_told(worker: Any) -> None:
+    bench = worker(PLUGIN, settings={"url": "http://mule..local:1/v1"})
+    with pytest.raises(WorkerFailed) as caught:
+        ask(bench)
     assert caught.value.code == "ENDPOINT_UNREACHABLE"
 
 
@@ -172,6 +188,8 @@ def test_no_server_is_asked_where_none_is_named(worker: Any) -> None:
     "settings",
     [
         *({"url": url} for url in ("mule:8080", "ftp://mule", "http://", "http://mule:x/v1")),
+        *({"url": url} for url in ("http://mule/v 1", "http://mule/ü", "http://mule/\n")),
+        *({"key": "two\nlines"}, {"key": "schlüssel"}, {"authority": "ü"}),
         *({"seconds": 0}, {"answer_tokens": 1}),
     ],
 )

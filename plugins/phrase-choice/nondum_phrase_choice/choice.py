@@ -32,8 +32,13 @@ class AnswerRefused(ValueError):
 
 
 def phrases_of(vocabulary: Mapping[str, Any]) -> Phrases:
-    """The phrases in what a host tells a translator."""
-    return {phrase["words"]: phrase["slots"] for phrase in vocabulary.get("phrases", ())}
+    """The phrases in what a host tells a translator; of two that are alike, the names of both."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for phrase in vocabulary.get("phrases", ()):
+        slots = found.setdefault(phrase["words"], {})
+        for slot, names in phrase["slots"].items():
+            slots[slot] = list(dict.fromkeys((*slots.get(slot, ()), *names)))
+    return found
 
 
 def instructions(phrases: Phrases) -> str:

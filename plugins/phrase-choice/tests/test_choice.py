@@ -36,6 +36,11 @@ def test_phrases_are_those_that_the_host_tells() -> None:
     assert phrases_of({"host": "rover"}) == {}
 
 
+def test_names_of_phrases_that_are_alike_are_taken_together() -> None:
+    one, other = ({"words": "find {c}", "slots": {"c": names}} for names in (["a"], ["b", "a"]))
+    assert phrases_of({"phrases": [one, other]}) == {"find {c}": {"c": ["a", "b"]}}
+
+
 @pytest.mark.parametrize(
     ("said", "meant"),
     [

@@ -6,6 +6,7 @@ import asyncio
 import errno
 import os
 import signal
+import threading
 
 import pytest
 from tests.kit.workers import HOST, WorkersUnderTest
@@ -80,6 +81,23 @@ async def test_behaviour_begins_once_what_was_granted_before_is_there(
     await asyncio.sleep(0)  # it has begun
     assert await node(tested) == seen(tested)
     await granting
+
+
+async def test_behaviour_that_waits_for_a_device_can_be_halted(tested: WorkersUnderTest) -> None:
+    await guest(tested)
+    free = threading.Event()
+    loop = asyncio.get_running_loop()
+    busy = [loop.run_in_executor(None, free.wait) for _ in range(64)]  # a device is let in by such
+    granting = asyncio.create_task(tested.workers.attach("guest", "line", "/dev/zero", {}))
+    await asyncio.sleep(0)
+    call = tested.behave("guest", "look", u=UNIT)
+    await asyncio.sleep(0)
+    call.halt()
+    assert await call.ended() is RunState.HALTED
+    assert not granting.done()
+    free.set()
+    await asyncio.gather(granting, *busy)
+    assert await node(tested) == seen(tested)
 
 
 async def test_device_that_is_being_pulled_is_not_told_as_another(tested: WorkersUnderTest) -> None:

@@ -94,7 +94,7 @@ def _gpu(root: Path) -> str:
 
 def _disk(config: HostConfig, root: Path) -> Iterator[Row]:
     state = config.host.state
-    there = next(one for one in (state, *state.parents) if one.exists())
+    there = next(one for one in (state, *state.parents) if os.access(one, os.F_OK))
     device = there.stat().st_dev
     numbers = os.major(device), os.minor(device)
     free_gb = shutil.disk_usage(there).free / 1e9
@@ -103,4 +103,4 @@ def _disk(config: HostConfig, root: Path) -> Iterator[Row]:
     try:
         yield Row("its speed", str(disk_speed.measure(there)))
     except OSError as error:
-        yield Row("its speed", f"not measured, as this user: {error.strerror or error}")
+        yield Row("its speed", f"not measured: {error.strerror or error}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any, cast, get_args
 
 from nondum.host.catalogue.catalogue import Catalogue
@@ -113,7 +114,8 @@ class GoalOrders:
         self, words: str, priority: int, refused: GoalRefused, arguments: Arguments
     ) -> Row:
         try:
-            understood = await self._nearly(words, refused)
+            has_person = not (arguments.flag("yes") or arguments.flag("keep"))
+            understood = await self._nearly(words, refused, is_slip_taken=has_person)
             understood = understood or await self.translated(words, refused)
         except GoalRefused as unknown:
             return self._kept(words, priority, unknown, arguments)
@@ -178,12 +180,15 @@ class GoalOrders:
         goals = [goal for goal in open_goals if id in (None, goal)]
         return {"goals": goals, "halted": list(halted), "peers": []}
 
-    async def _nearly(self, words: str, refused: GoalRefused) -> Understood | None:
+    async def _nearly(
+        self, words: str, refused: GoalRefused, *, is_slip_taken: bool
+    ) -> Understood | None:
         """The phrase that words are nearly. Raises `GoalRefused`."""
         composition = self.mind.composition
         if composition is None or refused.code not in translation.UNMATCHED:
             return None
-        return await asyncio.to_thread(translation.nearly, words, composition)
+        nearly = partial(translation.nearly, is_slip_taken=is_slip_taken)
+        return await asyncio.to_thread(nearly, words, composition)
 
     async def translated(self, words: str, refused: GoalRefused) -> Understood:
         """What components take words to mean that match no phrase. Raises `GoalRefused`."""

@@ -188,10 +188,10 @@ class Installation:
             reason := await self._reservations.why_not_beside(key, effect.beside)
         ):
             return (BesideRefused(key, reason),)
+        settings = await asyncio.to_thread(component_settings.load, self._options.settings)
         await self._workers.ended(effect.after)
         await self.shown.prepare(key, (c.id for c in installed.components if c.data))
         role = Role.BESIDE if effect.beside else Role.ACTIVE
-        settings = await asyncio.to_thread(component_settings.load, self._options.settings)
         specs = installed.specs(self._options.limits, settings)
         started = await asyncio.gather(
             *(self._workers.start(spec, role) for spec in specs), return_exceptions=True

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -20,7 +20,6 @@ from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
 from nondum.planning.pddl.syntax import type_text
 from nondum.planning.words.near import Near, nearest
 from nondum.planning.words.pattern import Slot, with_slots
-from nondum.planning.words.phrase import KnownPhrase
 from nondum.planning.words.phrases import Phrasebook
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.frozen import frozen
@@ -60,12 +59,14 @@ class Understood:
         return {"goal": self.pddl, "kind": self.kind, "by": list(self.by), "words": self.words}
 
 
-def nearly(words: str, composition: Composition) -> Understood | None:
-    """The only phrase that words are nearly; it takes its time, and is to be confirmed.
+def nearly(words: str, composition: Composition, *, is_slip_taken: bool) -> Understood | None:
+    """The only phrase that words are nearly; it takes its time, and is to be confirmed. Where no
+    slip is taken, only courtesies may be around it.
 
     Raises `GoalRefused` (TRANSLATION_AMBIGUOUS) where several are near.
     """
-    near = nearest(composition.book, words)
+    found = nearest(composition.book, words)
+    near = [one for one in found if is_slip_taken or not one.distance]
     readings = [_as_phrase(one, composition.host) for one in near]
     if len(readings) > 1:
         said = " or ".join(f'"{one.words}"' for one in near)
@@ -124,7 +125,7 @@ def vocabulary(composition: Composition) -> Vocabulary:
     told: Vocabulary = {
         "host": composition.host,
         "sentences": list(islice(book.offers(), _ENTRIES)),
-        "phrases": [_phrase(phrase, book) for phrase in islice(book.phrases, _ENTRIES)],
+        "phrases": list(islice(_phrases(book), _ENTRIES)),
         "predicates": [
             _declared(predicate)
             for predicate in islice(merged.domain.predicates.values(), _ENTRIES)
@@ -139,15 +140,14 @@ def vocabulary(composition: Composition) -> Vocabulary:
     return told
 
 
-def _phrase(phrase: KnownPhrase, book: Phrasebook) -> dict[str, Any]:
-    """A phrase and what may be said in the slots that must be filled."""
-    slots = (part for part in phrase.parts if isinstance(part, Slot))
-    names = {slot.name: [] if slot.is_free else _said(slot, book) for slot in slots}
-    return {"words": with_slots(phrase.parts), "slots": names}
-
-
-def _said(slot: Slot, book: Phrasebook) -> list[str]:
-    return [book.labels[thing] for thing in book.things_for(slot)[:_ENTRIES]]
+def _phrases(book: Phrasebook) -> Iterator[dict[str, Any]]:
+    """Phrases with what may be said in the slots that must be filled: all names there are. A phrase
+    for one of whose slots there is no name is left out."""
+    for phrase in book.phrases:
+        slots = [part for part in phrase.parts if isinstance(part, Slot)]
+        names = {slot.name: book.names_for(slot)[:_ENTRIES] for slot in slots}
+        if all(names[slot.name] or slot.is_free for slot in slots):
+            yield {"words": with_slots(phrase.parts), "slots": names}
 
 
 def _declared(predicate: Predicate) -> str:

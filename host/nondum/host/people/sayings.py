@@ -39,7 +39,7 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
     stops = list(stop_patterns(f"{{{ADDRESSEE}}}") if hosts else STOP_PATTERNS)
     phrases = dict.fromkeys((*stops, *(f"{addressee}{said}" for said in ASKED)))
     for phrase in book.phrases:
-        slots = {slot: _names(book, slot) for slot in phrase.binding_slots()}
+        slots = {slot: book.names_for(slot) for slot in phrase.binding_slots()}
         if all(slots.values()):
             names.update({_called(slot): words for slot, words in slots.items()})
             phrases[f"{addressee}{_pattern(phrase)}"] = None
@@ -51,11 +51,6 @@ def sayings(book: Phrasebook, hosts: Sequence[str] = ()) -> Sayings:
             told = told[: len(told) // 2]
         names = {slot: words[: (len(words) + 1) // 2] for slot, words in names.items()}
     return {"phrases": told, "names": names if told else {}, "stops": stops if told else []}
-
-
-def _names(book: Phrasebook, slot: Slot) -> list[str]:
-    fitting = frozenset(book.things_for(slot))
-    return sorted(" ".join(words) for words, things in book.names.items() if things & fitting)
 
 
 def _pattern(phrase: KnownPhrase) -> str:

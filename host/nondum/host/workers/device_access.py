@@ -10,7 +10,7 @@ from typing import Any
 
 from nondum.host.core.events.event import Emit
 from nondum.host.core.events.workers import WorkerLogged
-from nondum.host.sandbox.helper.grants import reachable, withdrawn
+from nondum.host.sandbox.helper.grants import TIMES, reachable, withdrawn
 from nondum.host.workers.device_ownership import DeviceOwnership
 from nondum.host.workers.leftovers import clear_away
 from nondum.host.workers.process import WorkerProcess, names_of
@@ -28,16 +28,20 @@ class DeviceAccess:
         """Need → name → node that it has by that name."""
         self._lending = DeviceOwnership(process.user)
 
-    async def let_in(self, need: str, device: Mapping[str, Any]) -> dict[str, Any]:
+    async def let_in(
+        self, need: str, device: Mapping[str, Any], *, times: int = TIMES
+    ) -> dict[str, Any]:
         """Have a device's nodes where the worker can open them, and no others that it had for that
-        need; what it is told of that."""
+        need; what it is told of that. A helper that does not answer is asked `times`."""
         names = dict(zip(names_of(need, device["nodes"]), device["nodes"], strict=True))
         had = self._granted.get(need, {})
         for name in tuple(had):
             if name not in names or had[name] != names[name]["node"]:
                 del had[name]
                 await self._shut_out(name)
-        inside = [{**n, "node": await self._open_up(need, name, n)} for name, n in names.items()]
+        inside = [
+            {**n, "node": await self._open_up(need, name, n, times)} for name, n in names.items()
+        ]
         return {**inside[0], "nodes": inside}
 
     async def shut_out(self, need: str) -> None:
@@ -50,11 +54,11 @@ class DeviceAccess:
         `OSError`."""
         return [partial(self._withdraw, name) for name in tuple(self._reached)]
 
-    async def _open_up(self, need: str, name: str, device: Mapping[str, Any]) -> str:
+    async def _open_up(self, need: str, name: str, device: Mapping[str, Any], times: int) -> str:
         """Have one node where the worker can open it; where that is."""
         own = device["node"]
         self._reached.add(name)
-        node = await asyncio.to_thread(self._reachable, name, own)
+        node = await asyncio.to_thread(self._reachable, name, own, times)
         if self._granted.setdefault(need, {}).get(name) != own:
             self._granted[need][name] = own
             try:
@@ -69,9 +73,9 @@ class DeviceAccess:
         self._reached.discard(name)
         await asyncio.to_thread(self._withdraw, name)
 
-    def _reachable(self, name: str, own: str) -> str:
+    def _reachable(self, name: str, own: str, times: int) -> str:
         """The node that it may open, for one of the machine's. Blocks."""
-        node = reachable(self._component, name, own, self._process.user)
+        node = reachable(self._component, name, own, self._process.user, times=times)
         self._lending.lend(name, node)
         return node
 

@@ -107,7 +107,8 @@ class Worker:
         """
         self.reports.expect(welcome["outputs"].values())
         given = welcome["devices"].items()
-        devices = {need: await self._access.let_in(need, device) for need, device in given}
+        # Once: who starts has `startup_s` for all of it.
+        devices = {need: await self._access.let_in(need, device, times=1) for need, device in given}
         nodes = {need: device.pop("nodes") for need, device in devices.items()}
         await self.link.meet({**welcome, "devices": devices, "device_nodes": nodes})
         said = await self.link.request("describe", {})

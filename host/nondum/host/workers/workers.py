@@ -422,8 +422,7 @@ class Workers:
         sent = [[p, list(objects), value] for p, objects, value in values if value is not None]
         try:
             await self._extra_workers.left(call.component)  # two releases do not act together
-            async with self._granting.setdefault(call.component, asyncio.Lock()):
-                pass  # what it was granted before it was asked is there when it begins
+            await self._granted(worker, call)
             async with self.streams.wired(call.component, call.behaviour, call.arguments):
                 if call.is_halting:
                     call.end(RunState.HALTED, "halted before it began")
@@ -433,6 +432,25 @@ class Workers:
             call.end(RunState.FAILED, problems.words(error))
         finally:
             call.end(RunState.FAILED, "it could not be asked")  # counts only if nothing else did
+
+    async def _granted(self, worker: Worker, call: Call) -> None:
+        """Wait for what its component is being granted, unless it is halted or the worker ends."""
+        granting = self._granting.get(call.component)
+        if granting is None or not granting.locked():
+            return
+        halted = asyncio.Event()
+        call.when_halted(halted.set)
+        granted = asyncio.ensure_future(granting.acquire())
+        halting = asyncio.ensure_future(halted.wait())
+        first: tuple[asyncio.Future[Any], ...] = (granted, halting, worker.gone)
+        try:
+            await asyncio.wait(first, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            halting.cancel()
+            granted.cancel()
+            (acquired,) = await asyncio.gather(granted, return_exceptions=True)
+            if acquired is True:
+                granting.release()
 
     def _tell(self, components: Iterable[str], event: str, body: Mapping[str, Any]) -> None:
         for component in components:

@@ -14,6 +14,8 @@ FREE_WORDS = "text"
 ARTICLES = frozenset({"the", "a", "an"})
 _PART = re.compile(r"\s*(?:\{\s*([\w-]+)\s*(?::\s*([\w-]+)\s*)?\}|([\[\]])|([^\s\[\]{}]+))")
 _SEPARATORS = re.compile(r"[^\w'-]+")
+_APOSTROPHES = dict.fromkeys(map(ord, "\u2019\u2018\u02bc\u00b4"), "'")
+"""As phones and word processors write them."""
 
 
 class PatternInvalid(ValueError):
@@ -59,7 +61,8 @@ def words_of(text: str) -> tuple[str, ...]:
     >>> words_of("Point at the Radiation-source, now!")
     ('point', 'at', 'the', 'radiation-source', 'now')
     """
-    return tuple(word for word in _SEPARATORS.split(text.casefold()) if word)
+    plain = text.casefold().translate(_APOSTROPHES)
+    return tuple(word for word in _SEPARATORS.split(plain) if word)
 
 
 def name_words(words: Sequence[str]) -> tuple[str, ...]:

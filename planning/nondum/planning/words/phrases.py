@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from itertools import islice
 
@@ -93,6 +94,11 @@ class Phrasebook:
         """The objects that can be named in a slot."""
         return tuple(sorted(name for name in self.labels if self._fits(name, slot)))
 
+    def names_for(self, slot: Slot) -> list[str]:
+        """All words for the objects that can be named in a slot; none for a free one."""
+        fitting = frozenset(() if slot.is_free else self.things_for(slot))
+        return sorted(" ".join(words) for words, things in self.names.items() if things & fitting)
+
     def _readings(self, sentence: str, words: tuple[str, ...]) -> list[Reading]:
         """Every different thing that a sentence may ask for."""
         found: dict[tuple[object, ...], Reading] = {}
@@ -158,7 +164,7 @@ class Phrasebook:
             for said in matches(phrase.parts, words, lambda _slot, _words: True):
                 for slot in phrase.binding_slots():
                     if slot.name in said and not self._meant(slot, said[slot.name]):
-                        return self._unknown_words(slot, said[slot.name])
+                        return _with_hint(words, self._unknown_words(slot, said[slot.name]))
         if not self.phrases:
             return Problem(
                 "PHRASE_UNKNOWN",
@@ -168,9 +174,8 @@ class Phrasebook:
         offers = self.offers()
         near = get_close_matches(" ".join(words), offers, n=3, cutoff=0.5)
         fix = _listed("say", near) if near else _listed("you can say", offers[:3])
-        for word, turn in islice(turning_words(words).items(), 1):
-            fix = f"{word!r} is in it: {turn.value}; {fix}"
-        return Problem("PHRASE_UNKNOWN", f"nothing here understands {sentence!r}", fix=fix)
+        message = f"nothing here understands {sentence!r}"
+        return _with_hint(words, Problem("PHRASE_UNKNOWN", message, fix=fix))
 
     def _unknown_words(self, slot: Slot, words: tuple[str, ...]) -> Problem:
         known = sorted(label for name, label in self.labels.items() if self._fits(name, slot))
@@ -211,6 +216,13 @@ def _said_names(
     for name, found in merged.objects.items():
         if not found.component:
             yield name, name_words((name,)), ""
+
+
+def _with_hint(words: Iterable[str], problem: Problem) -> Problem:
+    """The problem; where a word turns what is meant, with what can be done instead."""
+    for word, turn in turning_words(words).items():
+        return replace(problem, fix=f"{word!r} is in it: {turn.value}; {problem.fix}")
+    return problem
 
 
 def _spelled(reading: Reading) -> str:

@@ -3,6 +3,7 @@ where a recogniser or a keyboard may give it."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from enum import Enum
 
@@ -17,8 +18,21 @@ class Turn(Enum):
 
 _WORDS = {
     Turn.NEGATION: (
-        *("not", "no", "never", "don't", "dont", "doesn't", "won't", "can't", "cannot", "without"),
-        *("nor", "neither", "none", "nothing", "stop", "quit", "cancel", "except"),
+        *(
+            "not",
+            "no",
+            "never",
+            "cannot",
+            "without",
+            "nor",
+            "neither",
+            "none",
+            "nothing",
+            "stop",
+            "quit",
+            "cancel",
+            "except",
+        ),
         *("instead", "nicht", "kein", "keine", "keinen", "nie", "ohne"),
     ),
     Turn.CONDITION: (
@@ -27,6 +41,9 @@ _WORDS = {
     ),
     Turn.ANOTHER: ("and", "or", "then", "but", "afterwards", "und", "oder", "dann", "aber"),
 }
+_SHORT_NOT = re.compile(
+    r"\w+n't|(?:do|does|did|ca|wo|is|are|was|were|has|have|must|should|could|would)nt"
+)
 _TURNS = {word: turn for turn, words in _WORDS.items() for word in words}
 
 
@@ -36,4 +53,9 @@ def turning_words(words: Iterable[str]) -> dict[str, Turn]:
     >>> [(word, turn.name) for word, turn in turning_words(("go", "until", "noon")).items()]
     [('until', 'CONDITION')]
     """
-    return {word: _TURNS[word] for word in words if word in _TURNS}
+    found = ((word, _turn(word)) for word in words)
+    return {word: turn for word, turn in found if turn is not None}
+
+
+def _turn(word: str) -> Turn | None:
+    return Turn.NEGATION if _SHORT_NOT.fullmatch(word) else _TURNS.get(word)

@@ -7,7 +7,7 @@ import pwd
 import socket
 import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -24,9 +24,11 @@ MADE = "/run/nondum-helper/devices/eye/line"
 
 
 @contextmanager
-def helper(folder: Path, *, hangs_up: int) -> Iterator[tuple[HelperClient, list[bytes]]]:
+def helper(
+    folder: Path, *, hangs_up: int, then: Callable[[], object] = lambda: None
+) -> Iterator[tuple[HelperClient, list[bytes]]]:
     """One that ends so often without an answer, as when it is killed while it starts; and what it
-    is asked."""
+    is asked. `then` is done whenever it is asked."""
     path, asked = folder / "helper.sock", list[bytes]()
 
     def serve() -> None:
@@ -35,6 +37,7 @@ def helper(folder: Path, *, hangs_up: int) -> Iterator[tuple[HelperClient, list[
                 connection, _ = listening.accept()
                 with connection:
                     asked.append(connection.recv(MAX_PACKET))
+                    then()
                     if len(asked) > hangs_up:
                         connection.send(encode(Reply(requests.CALL, packed({"at": MADE}))))
 
@@ -59,7 +62,7 @@ def node(tmp_path: Path) -> str:
 @pytest.mark.parametrize("hangs_up", [0, 1, TIMES - 1])
 def test_helper_that_only_starts_is_asked_again(tmp_path: Path, node: str, hangs_up: int) -> None:
     with helper(tmp_path, hangs_up=hangs_up) as (client, asked):
-        assert reachable("eye", "line", node, USER, client) == MADE
+        assert reachable("eye", "line", node, USER, by=client) == MADE
     assert len(asked) == hangs_up + 1
 
 
@@ -67,12 +70,11 @@ def test_helper_that_never_answers_is_left_and_the_device_shown_as_it_is(
     tmp_path: Path, node: str
 ) -> None:
     with helper(tmp_path, hangs_up=TIMES) as (client, asked):
-        assert reachable("eye", "line", node, USER, client) == node
+        assert reachable("eye", "line", node, USER, by=client) == node
     assert len(asked) == TIMES
 
 
-def test_device_that_is_gone_is_not_asked_for_again(tmp_path: Path) -> None:
-    with helper(tmp_path, hangs_up=0) as (client, asked):
-        gone = str(tmp_path / "none")
-        assert reachable("eye", "line", gone, USER, client) == gone
-    assert asked == []
+def test_device_that_is_pulled_meanwhile_is_not_asked_for_again(tmp_path: Path, node: str) -> None:
+    with helper(tmp_path, hangs_up=TIMES, then=Path(node).unlink) as (client, asked):
+        assert reachable("eye", "line", node, USER, by=client) == node
+    assert len(asked) == 1

@@ -7,10 +7,12 @@ these is told: NVIDIA's, AMD's, another one with OpenCL, which shares the system
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +25,7 @@ SHARING = {"Jetson": ("cuda",), "Raspberry Pi": ("v3d",)}
 """Boards whose GPU uses the system's memory, and which have no NVML → its kinds."""
 ASIDE_S = 20.0
 """How long a child is waited for that asks NVML: a driver that wakes a GPU takes seconds."""
+ENDS_S = 2.0
 _MB = 1024 * 1024
 _AMD = "0x1002"
 """The vendor's number (PCI)."""
@@ -69,11 +72,19 @@ def look_aside(
     asked = (str(root), str(system_free_mb), str(system_total_mb))
     command = (sys.executable, "-P", "-m", "nondum.wheelhouse.payload.gpu", *asked)
     try:
-        done = subprocess.run(command, capture_output=True, timeout=seconds, check=True)
-    except (OSError, subprocess.SubprocessError) as error:
+        with tempfile.TemporaryFile() as out:
+            child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out)
+            try:
+                status = child.wait(seconds)
+            finally:
+                child.kill()
+                with contextlib.suppress(subprocess.TimeoutExpired):  # it hangs in its driver
+                    child.wait(ENDS_S)
+            out.seek(0)
+            told = json.loads(out.read().splitlines()[-1]) if status == 0 else None
+    except (OSError, subprocess.SubprocessError, ValueError, IndexError) as error:
         log.warning("NVML does not say what GPU there is: %s", error)
         return None
-    told = json.loads(done.stdout)
     return from_plain(Gpu, told) if told is not None else None
 
 

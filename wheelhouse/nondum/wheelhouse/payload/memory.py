@@ -63,16 +63,16 @@ class Memory:
             left = min(left, self.gpu.total_mb - taken)
         return max(0, left)
 
-    def gpu_left_mb(self, memory_mb: int) -> int:
-        """GPU memory for one more payload, which takes so much memory.
+    def gpu_left_mb(self, memory_mb: int, kind: str = "") -> int:
+        """GPU memory for one more payload, which takes so much memory; of a kind, or of any.
 
         >>> Memory(1000, Gpu(3000, 4000), Promised(gpu_memory_mb=1500)).gpu_left_mb(0)
         2500
         >>> Memory(1000, Gpu(1000, 4000, is_shared=True)).gpu_left_mb(600)
         400
         """
-        if self.gpu is None:
-            return 0
+        if self.gpu is None or (not kind and self.gpu.kinds == ("opencl",)):
+            return 0  # whose author names no kind means one that most programs can use
         if self.gpu.is_shared:
             return max(0, self.left_mb() - memory_mb)
         return max(0, min(self.gpu.free_mb, self.gpu.total_mb - self.promised.gpu_memory_mb))
@@ -95,7 +95,7 @@ class Memory:
 def problems(needs: Requires, have: Memory, payload_id: str) -> Iterator[Problem]:
     """What there is too little of for a payload, or not at all: NO_MEMORY, NO_GPU_KIND,
     NO_GPU_MEMORY."""
-    left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb)
+    left_mb, gpu_left_mb = have.left_mb(), have.gpu_left_mb(needs.memory_mb, needs.gpu_kind)
     if needs.memory_mb > left_mb:
         why, fix = _because(have.promised.unused_mb, have.promised.holders)
         yield Problem(
