@@ -1,86 +1,104 @@
-"""A language model in GGUF, run by llama.cpp in this process."""
+"""A language model in GGUF, held by a process of its kind: loaded, asked, and ended."""
 
 from __future__ import annotations
 
+import asyncio
+import json
 import os
-import time
+import sys
+from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
-
-import xllamacpp
 
 from nondum.sdk.errors import BehaviourFailed, ConfigRefused, Problem
 from nondum_language_model.settings import Settings
 
-_SOCKET = "llama.sock"
+_LONGEST = 1 << 20
+"""Bytes of a line that the process says."""
 
 
 class Model:
-    """Answers with JSON of a schema. Not for several threads at once."""
+    """Answers with JSON of a schema. Make it with `load`."""
 
-    def __init__(self, weights: Path, settings: Settings, folder: Path) -> None:
-        """Load `weights`; takes its time. llama.cpp always listens somewhere: in `folder`, not at a
-        port of the host. Raises `ConfigRefused` (WEIGHTS_UNREADABLE)."""
-        self._settings = settings
-        parameters = xllamacpp.CommonParams()
-        parameters.model.path = str(weights)
-        parameters.n_ctx = settings.context_tokens
-        parameters.n_parallel = 1
-        # Threads that spin while they wait for each other stand still where others need the
-        # processor: 11 s for 0.2 s of work on two that were busy.
-        threads = settings.threads or max(1, len(os.sched_getaffinity(0)) - 1)
-        for share in (parameters.cpuparams, parameters.cpuparams_batch):
-            share.n_threads, share.poll = threads, 0
-        parameters.warmup = parameters.ui = parameters.endpoint_slots = False
-        parameters.verbosity = -1
-        socket = folder / _SOCKET
-        socket.unlink(missing_ok=True)
-        # Relative: the address of a socket has 107 bytes.
-        parameters.hostnames = [os.path.relpath(socket)]
+    def __init__(self, process: Process, settings: Settings) -> None:
+        self._process, self._seconds = process, settings.seconds
+        self._exchange: asyncio.Task[dict[str, Any]] | None = None
+        """The newest question; it is answered whether or not somebody still waits."""
+
+    @classmethod
+    async def load(cls, weights: Path, settings: Settings, folder: Path) -> Model:
+        """Start a process and have it load `weights`; takes its time. What it needs on the way is
+        in `folder`. Raises `ConfigRefused` (WEIGHTS_UNREADABLE), `BehaviourFailed` (MODEL_ENDED).
+        """
+        told = (str(weights), json.dumps(asdict(settings)), str(folder))
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-P", "-m", "nondum_language_model.model_process", *told),
+            stdin=PIPE,
+            stdout=PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            limit=_LONGEST,
+        )
+        model = cls(process, settings)
         try:
-            self._server = xllamacpp.Server(parameters)
-        except RuntimeError as error:
-            raise _refused(str(weights), str(error)) from error
+            said = await model._line()
+            if "refused" in said:
+                raise _unreadable(str(weights), said["refused"])
+        except BaseException:
+            await model.end()
+            raise
+        return model
 
-    def answer(self, instructions: str, words: str, schema: Mapping[str, Any]) -> str:
+    async def answer(self, instructions: str, words: str, schema: Mapping[str, Any]) -> str:
         """What it says to a person's words: JSON of `schema`, but for one that ignores it.
 
         Raises `BehaviourFailed`: MODEL_OVERDUE when it takes too long, MODEL_REFUSED where
-        llama.cpp does, as of more words than fit into the context.
+        llama.cpp does, as of more words than fit into the context, MODEL_ENDED.
         """
-        said: list[str] = []
-        refused: list[str] = []
-        until = time.monotonic() + self._settings.seconds
+        asked = {"instructions": instructions, "words": words, "schema": dict(schema)}
+        try:
+            async with asyncio.timeout(self._seconds):
+                while self._exchange is not None and not self._exchange.done():
+                    await asyncio.wait({self._exchange})
+                self._exchange = asyncio.create_task(self._asked(asked))
+                said = await asyncio.shield(self._exchange)
+        except TimeoutError as error:
+            raise self._overdue() from error
+        if said.get("is_overdue"):
+            raise self._overdue()
+        if "refused" in said:
+            raise BehaviourFailed(f"llama.cpp: {said['refused']}", code="MODEL_REFUSED")
+        return str(said["answer"])
 
-        def is_enough(part: Mapping[str, Any]) -> bool:
-            if "error" in part:
-                refused.append(str(part["error"].get("message", part["error"])))
-            for choice in part.get("choices", ()):
-                said.append(choice["delta"].get("content") or "")
-            return time.monotonic() > until
+    async def end(self) -> None:
+        """End the process."""
+        if self._exchange is not None:
+            self._exchange.cancel()
+        if self._process.returncode is None:
+            self._process.kill()
+        await self._process.communicate()
 
-        form = {"name": "goal", "strict": True, "schema": dict(schema)}
-        asked = {
-            "messages": [
-                {"role": "system", "content": instructions},
-                {"role": "user", "content": words},
-            ],
-            "response_format": {"type": "json_schema", "json_schema": form},
-            "max_tokens": self._settings.answer_tokens,
-            "temperature": 0,
-            "stream": True,
-        }
-        self._server.handle_chat_completions(asked, is_enough)
-        if refused:
-            raise BehaviourFailed(f"llama.cpp: {refused[0]}", code="MODEL_REFUSED")
-        if time.monotonic() > until:
+    async def _asked(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{json.dumps(request)}\n".encode())
+        return await self._line()
+
+    async def _line(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = await self._process.stdout.readline()
+        if not line:
+            status = await self._process.wait()
             raise BehaviourFailed(
-                f"no answer within {self._settings.seconds:g} s", code="MODEL_OVERDUE"
+                f"the model's process ended with status {status}", code="MODEL_ENDED"
             )
-        return "".join(said)
+        said: dict[str, Any] = json.loads(line)
+        return said
+
+    def _overdue(self) -> BehaviourFailed:
+        return BehaviourFailed(f"no answer within {self._seconds:g} s", code="MODEL_OVERDUE")
 
 
-def _refused(where: str, why: str) -> ConfigRefused:
+def _unreadable(where: str, why: str) -> ConfigRefused:
     fix = "put a model in GGUF that llama.cpp can read on the drive, and one that fits the memory"
     return ConfigRefused(Problem("WEIGHTS_UNREADABLE", why, where=where, fix=fix))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,10 +17,14 @@ from nondum.sdk import (
     behaviour,
     hookimpl,
 )
+from nondum.sdk.errors import NondumError
 from nondum.sdk.settings import parse_settings
 from nondum_language_model.model import Model
 from nondum_language_model.settings import Settings
 from nondum_phrase_choice import choice
+
+LOOKS_S = 1.0
+"""Between two looks at what is shown, while the model is kept loaded."""
 
 
 class LanguageModel:
@@ -27,8 +32,7 @@ class LanguageModel:
 
     def __init__(self) -> None:
         self._settings = Settings()
-        self._loaded: tuple[Data, Model] | None = None
-        self._one_at_a_time = asyncio.Lock()
+        self._loaded: tuple[Data, asyncio.Task[Model]] | None = None
 
     @hookimpl
     def describe(self) -> dict[str, str]:
@@ -56,13 +60,27 @@ class LanguageModel:
         """Refuse wrong settings."""
         self._settings = parse_settings(Settings, ctx.settings, where=ctx.component)
 
+    @hookimpl
+    async def stop(self, ctx: Context) -> None:
+        """End the model's process."""
+        await self._leave()
+
     @behaviour("load", action="(load ?u - language-model ?h - host)", lasting=True)
     async def load(self, ctx: Context, u: str, h: str) -> None:
-        """Load the model before it is asked. Fails with DATA_MISSING and WEIGHTS_UNREADABLE."""
-        async with self._one_at_a_time:
-            await self._model(ctx)
-        await ctx.established()
-        await asyncio.Event().wait()
+        """Load the model before it is asked, and another one that takes its place.
+
+        Fails with DATA_MISSING, WEIGHTS_UNREADABLE and MODEL_ENDED.
+        """
+        try:
+            while (data := ctx.data("model")) is not None:
+                await self._model(ctx)
+                await ctx.established()
+                while ctx.data("model") == data:
+                    await ctx.sleep(LOOKS_S)
+            raise BehaviourFailed("no model is here", code="DATA_MISSING")
+        finally:
+            if ctx.data("model") is None:
+                await self._leave()
 
     @hookimpl
     async def translate_goal(
@@ -70,23 +88,46 @@ class LanguageModel:
     ) -> dict[str, str] | None:
         """Choose the phrase that means the same, if there is one; in the log is what was asked."""
         phrases = choice.phrases_of(vocabulary)
-        if not phrases or ctx.data("model") is None:
+        if ctx.data("model") is None:
+            await self._leave()
+            return None
+        if not phrases:
             return None
         instructions, schema = choice.instructions(phrases), choice.schema(phrases)
-        async with self._one_at_a_time:
-            model = await self._model(ctx)
-            answer = await asyncio.to_thread(model.answer, instructions, words, schema)
-        ctx.log.debug("the instructions of the model: %s", instructions)
+        ctx.log.info("the instructions of the model: %s", instructions)
+        model = await self._model(ctx)
+        try:
+            answer = await model.answer(instructions, words, schema)
+        except BehaviourFailed as failed:
+            if failed.code == "MODEL_ENDED":
+                await self._leave()
+            raise
         return choice.translation(words, answer, phrases, ctx.log)
 
     async def _model(self, ctx: Context) -> Model:
-        """The model that is shown now; the one before is left."""
+        """The model that is shown now; the one before is left. Who is cancelled meanwhile leaves it
+        loading for the next one."""
         data = ctx.data("model")
         if data is None:
-            self._loaded = None
             raise BehaviourFailed("no model is here", code="DATA_MISSING")
         if self._loaded is None or self._loaded[0] != data:
-            self._loaded = None
-            model = await asyncio.to_thread(Model, data.path, self._settings, ctx.scratch)
-            self._loaded = data, model
-        return self._loaded[1]
+            await self._leave()
+            loading = Model.load(data.path, self._settings, ctx.scratch)
+            self._loaded = data, asyncio.create_task(loading)
+        task = self._loaded[1]
+        try:
+            return await asyncio.shield(task)
+        except NondumError:
+            if self._loaded is not None and self._loaded[1] is task:
+                self._loaded = None
+            raise
+
+    async def _leave(self) -> None:
+        """End the model's process, loaded or not."""
+        if self._loaded is None:
+            return
+        _, task = self._loaded
+        self._loaded = None
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError, NondumError):
+            await (await task).end()

@@ -16,7 +16,7 @@ class Settings:
     answer_tokens: int = 256
     """Of the answer: a longer one is cut, and not taken."""
     seconds: float = 9.0
-    """For an answer: then it is broken off. The host waits `planning.translate_s`."""
+    """For an answer, loading left out. The host waits `planning.translate_s`."""
 
     def __post_init__(self) -> None:
         if self.threads < 0 or self.answer_tokens < 32 or self.seconds <= 0:

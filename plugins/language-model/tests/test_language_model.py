@@ -5,6 +5,9 @@ Such a model understands nothing: what it chooses is by chance, and must be one 
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +52,44 @@ def test_what_it_chooses_is_what_there_is(worker: Any, models: list[Path]) -> No
 def test_it_chooses_the_same_again(worker: Any, models: list[Path]) -> None:
     bench = begin(worker, models[0])
     assert ask(bench) == ask(bench)
+
+
+def processes(model: Path) -> list[int]:
+    """Those that hold a model."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            words = (folder / "cmdline").read_bytes().split(b"\0")
+            if b"nondum_language_model.model_process" in words and str(model).encode() in words:
+                found.append(int(folder.name))
+    return found
+
+
+def test_crash_of_the_model_costs_one_answer(worker: Any, models: list[Path]) -> None:
+    bench = begin(worker, models[0])
+    before = ask(bench)
+    (process,) = processes(models[0])
+    os.kill(process, signal.SIGKILL)
+    with pytest.raises(WorkerFailed) as caught:
+        ask(bench)
+    assert caught.value.code == "MODEL_ENDED"
+    assert ask(bench) == before
+
+
+def test_model_that_is_pulled_is_not_held(worker: Any, models: list[Path]) -> None:
+    bench = begin(worker, models[0])
+    ask(bench)
+    assert len(processes(models[0])) == 1
+    bench.hide("model")
+    assert ask(bench) is None
+    assert processes(models[0]) == []
+
+
+def test_model_ends_with_its_worker(worker: Any, models: list[Path]) -> None:
+    bench = begin(worker, models[0])
+    ask(bench)
+    bench.stop()
+    assert processes(models[0]) == []
 
 
 def test_robot_that_knows_no_phrases_is_not_helped(worker: Any, models: list[Path]) -> None:
