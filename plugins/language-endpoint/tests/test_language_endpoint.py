@@ -156,7 +156,7 @@ def test_server_that_drips_is_left_in_time(worker: Any, head: bytes) -> None:
             assert caught.value.code == "ENDPOINT_OVERDUE"
 
 
-def test_server_that_never_shakes_hands_is_left_in_time(worker: Any) -> None:
+def test_server_without_an_answer_to_tls_is_left_in_time(worker: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"https://127.0.0.1:{silent.getsockname()[1]}/v1"
         bench = worker(PLUGIN, settings={"url": url, "seconds": 0.5})

@@ -24,7 +24,7 @@ from nondum_language_model.settings import Settings
 from nondum_phrase_choice import choice
 
 LOOKS_S = 1.0
-"""Between two looks at what is shown, while the model is kept loaded."""
+"""Between two looks at what is shown, while a model is loaded."""
 
 
 class LanguageModel:
@@ -33,6 +33,7 @@ class LanguageModel:
     def __init__(self) -> None:
         self._settings = Settings()
         self._loaded: tuple[Data, asyncio.Task[Model]] | None = None
+        self._is_loaded = asyncio.Event()
 
     @hookimpl
     def describe(self) -> dict[str, str]:
@@ -59,6 +60,7 @@ class LanguageModel:
     async def start(self, ctx: Context) -> None:
         """Refuse wrong settings."""
         self._settings = parse_settings(Settings, ctx.settings, where=ctx.component)
+        ctx.spawn(self._leave_what_is_pulled(ctx))
 
     @hookimpl
     async def stop(self, ctx: Context) -> None:
@@ -71,16 +73,12 @@ class LanguageModel:
 
         Fails with DATA_MISSING, WEIGHTS_UNREADABLE and MODEL_ENDED.
         """
-        try:
-            while (data := ctx.data("model")) is not None:
-                await self._model(ctx)
-                await ctx.established()
-                while ctx.data("model") == data:
-                    await ctx.sleep(LOOKS_S)
-            raise BehaviourFailed("no model is here", code="DATA_MISSING")
-        finally:
-            if ctx.data("model") is None:
-                await self._leave()
+        while (data := ctx.data("model")) is not None:
+            await self._model(ctx)
+            await ctx.established()
+            while ctx.data("model") == data:
+                await ctx.sleep(LOOKS_S)
+        raise BehaviourFailed("no model is here", code="DATA_MISSING")
 
     @hookimpl
     async def translate_goal(
@@ -88,10 +86,7 @@ class LanguageModel:
     ) -> dict[str, str] | None:
         """Choose the phrase that means the same, if there is one; in the log is what was asked."""
         phrases = choice.phrases_of(vocabulary)
-        if ctx.data("model") is None:
-            await self._leave()
-            return None
-        if not phrases:
+        if not phrases or ctx.data("model") is None:
             return None
         instructions, schema = choice.instructions(phrases), choice.schema(phrases)
         ctx.log.info("the instructions of the model: %s", instructions)
@@ -114,6 +109,7 @@ class LanguageModel:
             await self._leave()
             loading = Model.load(data.path, self._settings, ctx.scratch)
             self._loaded = data, asyncio.create_task(loading)
+            self._is_loaded.set()
         task = self._loaded[1]
         try:
             return await asyncio.shield(task)
@@ -121,6 +117,14 @@ class LanguageModel:
             if self._loaded is not None and self._loaded[1] is task:
                 self._loaded = None
             raise
+
+    async def _leave_what_is_pulled(self, ctx: Context) -> None:
+        while True:
+            await self._is_loaded.wait()
+            self._is_loaded.clear()
+            while self._loaded is not None and self._loaded[0] == ctx.data("model"):
+                await ctx.sleep(LOOKS_S)
+            await self._leave()
 
     async def _leave(self) -> None:
         """End the model's process, loaded or not."""

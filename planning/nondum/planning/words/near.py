@@ -28,7 +28,7 @@ APART = 0.1
 MOST_LETTERS = 300
 """A longer sentence is not looked at."""
 MOST_SENTENCES = 2000
-"""So many of those that can be said are compared, which may take a second on a small board."""
+"""Of those that can be said, the number that is compared: a second of work on a small board."""
 _SHORTEST = 6
 """Letters: of what is shorter, too little is left."""
 _OTHERS = frozenset({"he", "she", "him", "her", "them", "they", "we", "us", "it"})
