@@ -14,6 +14,7 @@ from tests.kit.disk_images import attribute, image, on
 from tests.kit.host import LAMP
 from tests.kit.loop_devices import attached, can_be_made
 from tests.kit.payloads import Part
+from tests.kit.until import until_async
 
 from nondum.host.core.events.drives import (
     DriveInserted,
@@ -108,10 +109,21 @@ async def test_drive_that_is_mounted_by_somebody_is_told_and_not_touched(tmp_pat
             assert "elsewhere" in str(refused.value)
             assert attribute(node, "ro") == 0
             (tmp_path / "elsewhere/letter").write_text("it can still be written to")
+        await until_async("no process has it any more", lambda: not having(tmp_path / "elsewhere"))
         mounting.mount(node, tmp_path / "mounts/x", "ext4")
         mounting.mount(node, tmp_path / "mounts/y", "ext4")  # as it is for another host
         for name in ("x", "y"):
             mounting.unmount(tmp_path / "mounts" / name)
+
+
+def having(target: Path) -> list[str]:
+    """Processes that have something mounted there: sandboxes that began meanwhile, each with all
+    mounts of then until it leaves them."""
+    found = []
+    for file in Path("/proc").glob("[0-9]*/mountinfo"):
+        with contextlib.suppress(OSError):
+            found += [str(file)] if f" {target} " in file.read_text() else []
+    return found
 
 
 async def test_what_vanishes_while_it_is_looked_at_does_not_end_the_watcher(tmp_path: Path) -> None:

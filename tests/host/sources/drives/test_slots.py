@@ -151,6 +151,7 @@ async def test_drive_goes_though_watches_cannot_be_renewed(
         with descriptors_left(1):  # for reading the folder
             assert await told.get() == DriveRemoved("a")
             await clock.settle()
+        await until_async("the drives were looked at", lambda: not looking())
         before = open_descriptors()
         (slots / "b").mkdir()
         assert await told.get() == DriveInserted("b", slots / "b", "slot")
