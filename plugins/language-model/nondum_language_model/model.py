@@ -77,7 +77,7 @@ class Model:
             self._exchange.cancel()
         if self._process.returncode is None:
             self._process.kill()
-        await self._process.communicate()
+        await self._process.wait()
 
     async def _asked(self, request: Mapping[str, Any]) -> dict[str, Any]:
         assert self._process.stdin is not None

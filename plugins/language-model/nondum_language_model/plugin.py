@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -127,11 +126,14 @@ class LanguageModel:
             await self._leave()
 
     async def _leave(self) -> None:
-        """End the model's process, loaded or not."""
+        """End the model's process, loaded or not; who is cancelled meanwhile leaves that to the
+        next."""
         if self._loaded is None:
             return
         _, task = self._loaded
-        self._loaded = None
         task.cancel()
-        with contextlib.suppress(asyncio.CancelledError, NondumError):
-            await (await task).end()
+        (loaded,) = await asyncio.gather(task, return_exceptions=True)
+        if isinstance(loaded, Model):
+            await loaded.end()
+        if self._loaded is not None and self._loaded[1] is task:
+            self._loaded = None
