@@ -48,6 +48,7 @@ REFUSED = {
     "memory": ("NO_MEMORY", "memory_mb = 4000", "4000 MB", "1000 MB"),
     "gpu": ("NO_GPU_MEMORY", "gpu_memory_mb = 1", "1 MB", "0 MB"),
     "gpu-in-a-table": ("NO_GPU_MEMORY", "gpu = { memory_mb = 1 }", "1 MB", "0 MB"),
+    "gpu-kind-alone": ("NO_GPU_KIND", 'gpu_kind = "v3d"', "a GPU of kind v3d", "none"),
     "gpu-kind": ("NO_GPU_KIND", 'gpu = { kind = "cuda" }', "a GPU of kind cuda", "none"),
     "disk": ("DISK_FULL", "disk_mb = 1001", "1001 MB", "1000 MB"),
     "confinement": (

@@ -142,7 +142,7 @@ def parse(text: str, where: str, *, brings_goals: bool = False) -> Manifest:
 
 def _requires(table: Table) -> Requires:
     gpu = table.table("gpu")
-    kind = gpu.text("kind", _GPU_KIND, default="")
+    kind = gpu.text("kind", _GPU_KIND, default=table.text("gpu_kind", _GPU_KIND, default=""))
     memory_mb = gpu.integer("memory_mb", table.integer("gpu_memory_mb", 0))
     gpu.close()
     requires = Requires(
