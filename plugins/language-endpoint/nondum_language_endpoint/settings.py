@@ -26,7 +26,7 @@ class Settings:
     def __post_init__(self) -> None:
         if self.url and not _is_web(self.url):
             raise ValueError("url must begin with http:// or https:// and name a host, in ASCII")
-        for name in ("key", "authority"):  # neither is told: it may be a secret
+        for name in ("key", "authority"):  # the message shows no value: it may be a secret
             value = getattr(self, name)
             if not value.isascii() or (name == "key" and not value.isprintable()):
                 raise ValueError(f"{name} must be ASCII, a key in one line")

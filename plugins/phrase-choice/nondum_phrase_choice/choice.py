@@ -42,7 +42,7 @@ def phrases_of(vocabulary: Mapping[str, Any]) -> Phrases:
 
 
 def instructions(phrases: Phrases) -> str:
-    """What the model is told before the person's words."""
+    """The system prompt: the phrases, and how to answer."""
     listed = "\n".join(f"- {_listed(words, slots)}" for words, slots in phrases.items())
     others = "\n".join(f'{{"goal": "{name}"}}: {why}' for name, why in NO_SENTENCE.items())
     return (

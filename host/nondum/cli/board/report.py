@@ -1,4 +1,4 @@
-"""All that is told of a machine, row by row, and as Markdown."""
+"""Collects the rows of the report on a machine, and formats them as Markdown."""
 
 from __future__ import annotations
 

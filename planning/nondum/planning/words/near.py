@@ -110,7 +110,7 @@ def _is_another(said: set[str], meant: set[str]) -> bool:
 
 
 def _stem(word: str) -> str:
-    """What is left of a word without what would turn it round.
+    """A word without the prefix that makes it its opposite.
 
     >>> _stem("deactivate"), _stem("increase"), _stem("lock")
     ('activate', 'crease', 'lock')

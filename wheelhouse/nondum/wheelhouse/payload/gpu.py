@@ -1,8 +1,8 @@
 """The GPU of a machine: how programs can use it, and what memory it has.
 
 NVML is asked through nvidia-ml-py, and only by processes that end soon, or in a child
-(`look_aside`): it keeps memory and threads, and may hang. Where a machine has several, the first of
-these is told: NVIDIA's, AMD's, another one with OpenCL, which shares the system's memory.
+(`look_aside`): it keeps memory and threads, and may hang. Where a machine has several, `look`
+returns the first of these: NVIDIA's, AMD's, another with OpenCL, sharing the system's memory.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def look(system_free_mb: int, system_total_mb: int, *, root: Path = ROOT) -> Gpu
 def look_aside(
     system_free_mb: int, system_total_mb: int, *, root: Path = ROOT, seconds: float = ASIDE_S
 ) -> Gpu | None:
-    """The same, for a process that stays: where NVML would be asked, a child asks it. Blocks; a
-    child that hangs or crashes is told of in the log."""
+    """The same, for a process that stays: where NVML would be asked, a child asks it. Blocks; logs
+    a warning where the child hangs or crashes."""
     if not _has_nvidia(root):
         return look(system_free_mb, system_total_mb, root=root)
     asked = (str(root), str(system_free_mb), str(system_total_mb))
