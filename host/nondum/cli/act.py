@@ -134,12 +134,14 @@ def _shown(session: Session, given: dict[str, Any], *, wait: bool) -> int:
 def say(session: Session, words: tuple[str, ...]) -> None:
     """Say something to the robot, as if it had heard it.
 
-    It answers "what can you do" and "what are you doing", also where nothing is plugged in, and has
-    a peer answer that is named first. "Stop" stops it; all else is a goal, for it or for the one
-    peer that can have it. What it answers is spoken, too, where something speaks.
+    It answers "what can you do", "what are you doing", "why not", "what happened", "who is here"
+    and "what can I pull", also where nothing is plugged in, and has a peer answer that is named
+    first. "Stop" stops it; all else is a goal, for it or for the one peer that can have it. What it
+    answers is spoken, too, where something speaks.
 
     \b
     Examples: nondum say what can you do
+              nondum say "why can't you follow me?"
               nondum say "scout, what are you doing"
     """
     _show_answer(session, session.ask("say", timeout_s=None, words=" ".join(words)))

@@ -134,11 +134,11 @@ class RunningHost:
             base, self.workers, executor, self.mind, self.peers, self.places
         )
         self.talk = make_conversation(
-            base,
             self.workers,
             self.mind,
             self.peers,
             take=lambda words: self.goals.orders.take_words(words),
+            known=lambda: self.feedback.known(),
         )
         self.feedback = self._make_feedback()
         self.stop_all = stop_all(self.peers, self.stops.stopping)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,10 +15,20 @@ from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT
 
 from nondum.host.core.records.component import ComponentState
 from nondum.host.core.records.device import DeviceClaim
+from nondum.host.core.records.drive import DriveRecord, DriveState
+from nondum.host.core.records.payload import PayloadRecord
+from nondum.host.core.records.peer import PeerComponent, PeerRecord
+from nondum.host.core.records.step import Step
+from nondum.host.mind.announcements import Told
 from nondum.host.mind.lack import Need
 from nondum.host.people.answering import Answering
 from nondum.host.people.answers import LONGEST, abilities, activity, of_the_robot
+from nondum.host.people.feedback.state_reasons import Known
+from nondum.host.people.hosts_here import hosts_here
+from nondum.host.people.pulling import pulling
+from nondum.host.people.recent import recent
 from nondum.sdk.description import Label, PluginDescription
+from nondum.sdk.errors import Problem
 
 POINTING: PluginDescription = replace(
     PAN_TILT_UNIT,
@@ -51,6 +62,10 @@ def answered(robot: Robot, coming: int = 0) -> str:
     return abilities(robot.mind.views.goals()()["can"], coming)
 
 
+def known(robot: Robot, *drives: DriveRecord, unmounted: tuple[str, ...] = ()) -> Known:
+    return Known(replace(robot.mind.beliefs.snapshot, drives=drives), unmounted)
+
+
 @pytest.mark.anyio
 async def test_robot_says_what_it_can_do_and_what_it_lacks(robot: Robot, golden: Golden) -> None:
     golden.check("nothing is plugged in", answered(robot))
@@ -70,7 +85,7 @@ async def test_robot_says_what_it_can_do_and_what_it_lacks(robot: Robot, golden:
 async def test_component_that_waits_for_its_device_is_said_instead_of_what_it_lacks(
     robot: Robot, golden: Golden
 ) -> None:
-    answering = Answering(robot.mind, lambda: (), lambda: ())
+    answering = Answering(robot.mind, lambda: known(robot), lambda: ())
     robot.plug(POINTING)
     needs = (DeviceClaim("head", {"usb": "*:*"}, optional=False),)
     unit = replace(robot.components["pan-tilt-unit"], devices=needs)
@@ -171,3 +186,118 @@ def test_whatever_strangers_write_an_answer_can_be_spoken(
 def test_who_speaks_is_somebody_else(golden: Golden) -> None:
     told = of_the_robot("Tell me where my car is, and you yourself")
     golden.check("a sentence is said back", told)
+
+
+@pytest.mark.anyio
+async def test_robot_says_why_it_does_not_do_what_was_asked_for(
+    robot: Robot, golden: Golden
+) -> None:
+    answering = Answering(robot.mind, lambda: known(robot), lambda: ())
+
+    async def told(words: str) -> str:
+        return await answering.own(words) or ""
+
+    golden.check("why not, nothing is plugged in", await told(f"why can't you {POINT}"))
+    golden.check("why not, nothing was asked for", await told("why not"))
+    robot.plug(POINTING)
+    golden.check("why not, there is nothing to name", await told(f"why can't you {POINT}"))
+    golden.check("why not, no phrase says it", await told("why don't you sing for me"))
+    robot.plug(SENSING)
+    golden.check("why not, it can", await told(f"why don't you {POINT}"), point=POINT)
+    robot.mind.give(words=POINT)
+    await robot.until_holding()
+    golden.check("why not, it does", await told(f"why won't you {POINT}"), point=POINT)
+    golden.check("why not, all is well", await told("what is missing"))
+    robot.set_state("pan-tilt-unit", ComponentState.RESTARTING)
+    await robot.until_goal("suspended")
+    golden.check("why not, the head is not ready", await told("why not"), point=POINT)
+    golden.check("why not that, no head", await told(f"why can't you {POINT}"), point=POINT)
+    robot.mind.halt()
+    golden.check("why not, it was halted", await told("why not"), point=POINT)
+
+
+@pytest.mark.anyio
+async def test_robot_says_what_happened_but_not_what_it_answered(
+    robot: Robot, golden: Golden
+) -> None:
+    answering = Answering(robot.mind, lambda: known(robot), lambda: ())
+    assert await answering.answer("what happened") == "Nothing yet."
+    robot.mind.people.tell("eye is here: it can look")
+    first = await answering.answer("what happened")
+    golden.check("what happened: a component came", first or "")
+    assert await answering.answer("what is new") == first
+
+
+def told_at(*texts: str, every_s: float = 60.0) -> list[Told]:
+    return [Told(number, number * every_s, text) for number, text in enumerate(texts, 1)]
+
+
+@pytest.mark.parametrize(
+    ("situation", "every_s", "texts"),
+    [
+        ("two things happened", 45.0, ["eye is here", "lamp is refused: X it is dark → light it"]),
+        ("an hour passed", 1800.0, ["eye is here", "eye is gone"]),
+        ("days passed", 90_000.0, ["eye is here"]),
+        ("more happened than can be spoken", 60.0, [f"{n} {'is here' * 8}" for n in range(9)]),
+        ("one thing happened that is too long", 60.0, ["is here " * 40]),
+    ],
+)
+def test_what_happened_is_told_with_how_long_ago(
+    golden: Golden, situation: str, every_s: float, texts: list[str]
+) -> None:
+    told = recent(told_at(*texts, every_s=every_s), len(texts) * every_s + every_s)
+    golden.check(situation, told)
+    assert len(told) <= LONGEST
+
+
+@pytest.mark.anyio
+async def test_robot_says_which_drives_may_be_pulled(robot: Robot, golden: Golden) -> None:
+    drive = DriveRecord("sdb1-7", "block", Path("/mnt"), state=DriveState.IDLE)
+    robot.plug(POINTING)
+    (component,) = robot.components.values()
+    payload = PayloadRecord(
+        key=component.payload,
+        digest="d",
+        payload_id=component.payload_id,
+        version="1",
+        release=1,
+        fleet="",
+        step=Step.ACTIVE,
+        sources={"sdb1-7": Path("/mnt/nondum/x")},
+        phases={},
+    )
+    snapshot = replace(robot.mind.beliefs.snapshot, payloads=(payload,), drives=(drive,))
+
+    def told(used: str = "", *, unmounted: bool = True, **changes: Any) -> str:
+        seen = replace(snapshot, **changes)
+        return pulling(Known(seen, ("sdb1-7",) if unmounted else ()), {used})
+
+    golden.check("pull: no drive", told(drives=()))
+    golden.check("pull: its payload is active", told())
+    golden.check("pull: its component acts", told("pan-tilt-unit"))
+    staged = replace(payload, step=Step.STAGED)
+    golden.check("pull: it is being installed", told(payloads=(staged,)))
+    reading = replace(drive, state=DriveState.READING)
+    golden.check("pull: it is being read", told(drives=(reading,), unmounted=False))
+    golden.check("pull: it is mounted", told(unmounted=False))
+    refused = replace(payload, step=Step.REFUSED)
+    golden.check("pull: its payload is refused", told(payloads=(refused,)))
+    broken = replace(drive, problems=(Problem("FS_UNSUPPORTED", "no file system"),))
+    golden.check("pull: it cannot be read", told(payloads=(), drives=(broken,), unmounted=False))
+    many = tuple(replace(drive, id=f"sd{letter}1-{letter}") for letter in "cdefghij")
+    golden.check("pull: nine drives", told(drives=(*many, drive)))
+
+
+def test_robot_says_who_is_here(golden: Golden) -> None:
+    def peer(name: str, *components: str) -> PeerRecord:
+        payload = ("life", "org.example.x", "1", POINTING)
+        offered = tuple(
+            PeerComponent(f"{one}@{name}", *payload, is_ready=True, rank=1) for one in components
+        )
+        return PeerRecord("key", name, "address", "pairing", "life", offered)
+
+    golden.check("who: no other host", hosts_here("rover", ()))
+    golden.check("who: one with two components", hosts_here("rover", (peer("mule", "eye", "ear"),)))
+    two = (peer("mule", "a", "b", "c", "d"), peer("llama"))
+    golden.check("who: two", hosts_here("rover", two))
+    golden.check("who: thirty", hosts_here("rover", [peer(f"mule-{n:02}") for n in range(30)]))

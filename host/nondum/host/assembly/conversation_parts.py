@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from nondum.host.assembly.base import Base
 from nondum.host.mind.mind import Mind
 from nondum.host.people.answering import Answering
 from nondum.host.people.conversation import Conversation, Take
+from nondum.host.people.feedback.state_reasons import Known
 from nondum.host.workers.workers import Workers
 from nondum.sdk.frozen import frozen
 
@@ -24,10 +25,16 @@ class ConversationParts:
 
 
 def make_conversation(
-    base: Base, workers: Workers, mind: Mind, peers: PeerServices | None, take: Take
+    workers: Workers,
+    mind: Mind,
+    peers: PeerServices | None,
+    *,
+    take: Take,
+    known: Callable[[], Known],
 ) -> ConversationParts:
-    """Make what talks with people; `take` makes goals of what they say."""
+    """Make what talks with people; `take` makes goals of what they say, `known` is what the host
+    shows its state by."""
     ask = peers.asking.ask if peers else None
-    answering = Answering(mind, lambda: base.catalogue.snapshot().payloads, workers.busy, ask)
+    answering = Answering(mind, known, workers.busy, ask)
     conversation = Conversation(mind, workers.pids, take, answering.answer)
     return ConversationParts(answering, conversation)

@@ -42,6 +42,8 @@ class Told:
     """What it is about, where that can be gone: `drive sdb1-7`."""
     is_over: bool = False
     """Whether that is gone."""
+    is_answer: bool = False
+    """Whether it only says again what was known: somebody asked."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for people's tools."""
@@ -75,12 +77,12 @@ class People:
         """The last `NEWEST` sentences, the newest last."""
         return [told.text for told in self.since(self._number - NEWEST)]
 
-    def tell(self, text: str, about: str = "") -> None:
+    def tell(self, text: str, about: str = "", *, is_answer: bool = False) -> None:
         """Say a sentence, `about` something that may be gone some time."""
         self._number += 1
         text = self._short(text)
         kept = text if len(text) <= MAX_CHARACTERS else f"{text[:MAX_CHARACTERS]}…"
-        self._told.append(Told(self._number, self._wall_s(), kept, about))
+        self._told.append(Told(self._number, self._wall_s(), kept, about, is_answer=is_answer))
 
     def end(self, about: str) -> None:
         """What sentences were about is gone."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any, TypeAlias
 
 from nondum.host.mind.composition import Composition
@@ -51,12 +51,7 @@ def phrases(composition: Composition) -> list[Row]:
     return [row for _, row in sorted(rows.items())]
 
 
-def offers(
-    composition: Composition,
-    facts: frozenset[str],
-    bare_facts: frozenset[str],
-    seen: Iterable[Seen],
-) -> list[Row]:
+def offers(composition: Composition, outlook: Outlook) -> list[Row]:
     """Each sentence: `words`, `goal`, `kind`, `now`, `lacks`, `needs`, `from` (components).
 
     `now` is `holds`, `can` (nothing is missing, deletes ignored), `cannot` (then `lacks` says what,
@@ -64,13 +59,12 @@ def offers(
     means something else too), or `unknown` where there are too many ways to look at. Phrases with
     nothing to name are there as their authors wrote them.
     """
-    outlook = _Outlook(composition, facts, bare_facts, tuple(seen))
     readings: dict[tuple[object, ...], list[Reading]] = {}
     for reading in composition.book.offered():
         readings.setdefault((reading.goal.text, *reading.meaning), []).append(reading)
     said = Counter(same[0].goal.text for same in readings.values())
     rows = [
-        _row(same, outlook, composition, is_clear=said[same[0].goal.text] == 1)
+        offer(same, outlook, composition, is_clear=said[same[0].goal.text] == 1)
         for same in readings.values()
     ]
     return sorted([*rows, *_mute(composition)], key=lambda row: (row["words"], row["goal"]))
@@ -80,12 +74,13 @@ def prospect(
     composition: Composition, facts: frozenset[str], bare_facts: frozenset[str], goal: Goal
 ) -> str:
     """`now` of one goal: `holds`, `can`, `cannot` or `unknown`, see `offers`."""
-    return _Outlook(composition, facts, bare_facts, ()).of(goal)[0]
+    return Outlook(composition, facts, bare_facts, ()).of(goal)[0]
 
 
-def _row(
-    same: list[Reading], outlook: _Outlook, composition: Composition, *, is_clear: bool
+def offer(
+    same: list[Reading], outlook: Outlook, composition: Composition, *, is_clear: bool = True
 ) -> Row:
+    """The row of a goal, which several phrases may ask for; `is_clear`: its words mean no other."""
     goal = same[0].goal
     now, why = outlook.of(goal) if is_clear else ("ambiguous", _NOTHING)
     return {
@@ -144,7 +139,7 @@ def _slot(slot: Slot, composition: Composition) -> Row:
     return {"slot": slot.name, "types": list(slot.types), "values": values}
 
 
-class _Outlook:
+class Outlook:
     """Whether goals can be had. One exploration serves all that ask for facts only."""
 
     def __init__(

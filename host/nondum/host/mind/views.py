@@ -25,6 +25,7 @@ from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.ground.conclusions import conclusions
 from nondum.sdk.description import Behaviour
+from nondum.sdk.errors import GoalRefused, Problem
 
 
 class Shown(Protocol):
@@ -123,22 +124,40 @@ class Views:
     def goals(self) -> Callable[[], Row]:
         """What can be asked for now and what was, worked out by the function that is given, in any
         thread: `can` and `phrases`, see `offers`; `given`; `problems` of phrases."""
-        composition, given = self._mind.composition, self.given()
-        world, seen = self._mind.beliefs.world, self._mind.pursuit.seen
-        facts, bare_facts = world.facts, world.bare_facts
+        composition, given, outlook = self._mind.composition, self.given(), self._outlook()
 
         def goals() -> Row:
             if composition is None:
                 return {"can": [], "phrases": [], "given": given, "problems": []}
-            follows = conclusions(composition.merged, facts).keys()
             return {
-                "can": offers.offers(composition, facts | follows, bare_facts, seen),
+                "can": offers.offers(composition, outlook(composition)),
                 "phrases": offers.phrases(composition),
                 "given": given,
                 "problems": [str(problem) for problem in composition.book.problems],
             }
 
         return goals
+
+    def wish(self, words: str) -> Callable[[], Row]:
+        """Whether words can be had as a goal now, worked out by the function that is given, in any
+        thread: a row of `offers`. Raises `GoalRefused` where they mean nothing or several things.
+        """
+        composition, outlook = self._mind.composition, self._outlook()
+        if composition is None:
+            raise GoalRefused(Problem("PHRASE_UNKNOWN", f"nothing here understands {words!r}"))
+        reading = composition.book.reading(words)
+        return lambda: offers.offer([reading], outlook(composition), composition)
+
+    def _outlook(self) -> Callable[[Composition], offers.Outlook]:
+        """What can be had by what is believed now, once it is worked out."""
+        world, seen = self._mind.beliefs.world, self._mind.pursuit.seen
+        facts, bare_facts = world.facts, world.bare_facts
+
+        def outlook(composition: Composition) -> offers.Outlook:
+            follows = conclusions(composition.merged, facts).keys()
+            return offers.Outlook(composition, facts | follows, bare_facts, tuple(seen))
+
+        return outlook
 
     def why(self, away: Sequence[str] = ()) -> Row:
         """Why the robot does what it does, or cannot: `sentences` and `problems`. `away` are those

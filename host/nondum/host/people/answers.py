@@ -43,8 +43,7 @@ def abilities(can: Sequence[Row], coming: int = 0, waiting: Sequence[str] = ()) 
         return f"{_NOTHING}: {_coming(coming) or 'nothing is plugged in that knows words'}."
     end = f"; {_coming(coming)}" if coming else ""
     told = (_abilities(able, lacking, most, more) for most, more in _LENGTHS)
-    sentences = [f"{words}{end}." for words in told if words]
-    return next((s for s in sentences if len(s) <= LONGEST), _cut(sentences[-1]))
+    return fitting(f"{words}{end}" for words in told if words)
 
 
 def activity(
@@ -71,8 +70,7 @@ def activity(
     if first is None:
         why = lent_out or _coming(coming) or "no one has asked for anything"
         return f"I do nothing{' of my own' if lent_out else ''}: {why}."
-    told = [f"{words}{end}." for end in (ends, "") for words in _pursued(first, steps)]
-    return next((s for s in told if len(s) <= LONGEST), _cut(told[-1]))
+    return fitting(f"{words}{end}" for end in (ends, "") for words in pursued(first, steps))
 
 
 _URGENCY = ("active", "queued", "suspended")
@@ -83,10 +81,11 @@ def _abilities(able: Sequence[str], lacking: Sequence[str], most: int, more: int
         return f"I can do nothing now: {'; '.join(lacking[:more])}" if more else ""
     if not most:
         return ""
-    return "; ".join([f"I can {_few(able, most)}", *lacking[:more]])
+    return "; ".join([f"I can {few(able, most)}", *lacking[:more]])
 
 
-def _few(words: Sequence[str], most: int) -> str:
+def few(words: Sequence[str], most: int) -> str:
+    """The first words, and how many more there are."""
     left = len(words) - most
     more = [f"{left} thing{'s' if left > 1 else ''} more"] if left > 0 else []
     return listed([*words[:most], *more])
@@ -112,11 +111,20 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
         need = next(filter(None, map(_need, row["needs"])), "")
         wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(as_said(row["words"])))
     return [
-        f"to {_few(list(words.values()), 2)} I need {need}"
+        f"to {few(list(words.values()), 2)} I need {need}"
         if need
-        else f"I cannot {_few(list(words.values()), 2)} now"
+        else f"I cannot {few(list(words.values()), 2)} now"
         for need, words in wanted.items()
     ]
+
+
+def wish_lacks(row: Row) -> str:
+    """What is missing for one row of `offers`.
+
+    >>> wish_lacks({"words": "follow me", "goal": "a", "needs": []})
+    'I cannot follow you now'
+    """
+    return next(iter(_lacking([row])), f"I cannot {of_the_robot(as_said(row['words']))} now")
 
 
 def _need(need: Row) -> str:
@@ -136,7 +144,7 @@ def _need(need: Row) -> str:
     return ""
 
 
-def _pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
+def pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
     """What becomes of a goal, shorter and shorter."""
     text = goal["text"]
     head = f"I was asked for {text}" if "(" in text else f"I was asked to {of_the_robot(text)}"
@@ -187,8 +195,12 @@ def _run(names: Collection[str]) -> str:
     return "runs" if len(names) == 1 else "run"
 
 
-def _cut(sentence: str) -> str:
-    return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST - 1]}…"
+def fitting(told: Iterable[str]) -> str:
+    """The first that is short enough to be spoken, as a sentence; else the last, cut."""
+    sentences = [f"{words}." for words in told]
+    last = sentences[-1]
+    cut = last if len(last) <= LONGEST else f"{last[: LONGEST - 1]}…"
+    return next((one for one in sentences if len(one) <= LONGEST), cut)
 
 
 def of_the_robot(words: str) -> str:

@@ -117,12 +117,13 @@ class Feedback:
             return
 
     def _look(self) -> Shown:
-        found, now_s = state_reasons(self._known()), self._now_s()
+        found, now_s = state_reasons(self.known()), self._now_s()
         self._since = showing.since(self._since, found, now_s)
         self._shown = showing.shown(found, self._since, now_s, self._durations)
         return self._shown
 
-    def _known(self) -> Known:
+    def known(self) -> Known:
+        """All that the state is made of."""
         sources = self._sources
         unwritten = tuple(
             refusal(State.HELP, "catalogue", "what happens is not on disk", [problem])

@@ -72,13 +72,18 @@ def _of_drive(drive: DriveRecord, known: Known) -> Iterator[StateReason]:
     elif drive.state is not DriveState.IDLE:
         yield StateReason(State.WORKING, about, f"drive {drive.id} is being read", drive=drive.id)
     elif drive.kind in PLUGGED and is_safe(drive, known):
-        yield StateReason(State.SAFE, about, _may_be_pulled(drive, known.snapshot), drive=drive.id)
+        yield StateReason(State.SAFE, about, may_be_pulled(drive, known.snapshot), drive=drive.id)
 
 
-def _may_be_pulled(drive: DriveRecord, snapshot: Snapshot) -> str:
-    """That nothing is lost by it, and what ends: what came with no other drive."""
+def ending_with(drive: DriveRecord, snapshot: Snapshot) -> list[str]:
+    """The components that end when a drive is pulled: those that came with no other one."""
     ending = {payload.key for payload in snapshot.payloads if set(payload.sources) == {drive.id}}
-    names = [component.id for component in snapshot.components if component.payload in ending]
+    return [component.id for component in snapshot.components if component.payload in ending]
+
+
+def may_be_pulled(drive: DriveRecord, snapshot: Snapshot) -> str:
+    """That nothing is lost by it, and what ends."""
+    names = ending_with(drive, snapshot)
     then = f"; {' and '.join(names)} then end{'s' if len(names) == 1 else ''}" if names else ""
     return f"drive {drive.id} may be pulled{then}"
 
