@@ -114,6 +114,7 @@ def test_person_confirms_at_the_terminal(daemon: RunningHost) -> None:
     asked = ("--control", daemon.control, "goal", "brighten up")
     code, shown = at_terminal(*asked, typed="y\n")
     assert (code, LIT in shown) == (0, True), shown
+    assert "I would see to (lit panther), with beacon: " in shown
     daemon.until("the goal holds", holds)
 
 
@@ -131,7 +132,7 @@ def test_person_declines_at_the_terminal(daemon: RunningHost) -> None:
         ("dance", "TRANSLATION_REFUSED interpreter: it understands 'waltz with people'"),
         ("sing", "TRANSLATION_INVALID interpreter: its answer is no goal"),
         ("mumble", "PHRASE_UNKNOWN"),
-        ("what do you know", "PHRASE_UNKNOWN"),
+        ("what do you know", "TRANSLATION_FAILED interpreter: "),
     ],
 )
 def test_what_means_nothing_is_refused_by_name(daemon: RunningHost, words: str, why: str) -> None:

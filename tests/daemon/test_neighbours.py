@@ -21,6 +21,14 @@ from tests.kit.until import until
 pytestmark = pytest.mark.daemon
 
 Hosts = list[RunningHost]
+INTERPRETER = """
+'''Understands what it is told to, of any host.'''
+from nondum.sdk import hookimpl
+
+@hookimpl
+async def translate_goal(ctx, words, vocabulary):
+    return {"words": "shine"} if "shine" in vocabulary["sentences"] else None
+"""
 
 
 @pytest.fixture(scope="module")
@@ -305,6 +313,15 @@ def test_question_that_names_a_host_is_answered_by_it(pair: Hosts, tmp_path: Pat
     assert not mule.ask("say", words="what can you do")["answer"].startswith("rover")
     rover.until_goal(rover.want("(lit rover)"), "holds")
     assert "(lit rover)" in mule.ask("say", words="rover, what are you doing")["answer"]
+
+
+def test_words_are_translated_by_a_component_of_a_peer(pair: Hosts, tmp_path: Path) -> None:
+    rover, mule = pair
+    mule.bring("interpreter", Part("interpreter", INTERPRETER))
+    rover.bring("light", shining(tmp_path / "log"))
+    given = rover.ask("goal", words="I cannot see a thing", yes=True)
+    assert given["understood"]["by"] == ["interpreter@mule"]
+    rover.until_goal(given["id"], "holds")
 
 
 def test_spoken_question_is_answered_by_the_host_that_it_names(pair: Hosts, tmp_path: Path) -> None:

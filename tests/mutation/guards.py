@@ -260,6 +260,7 @@ GUARDS: Mapping[str, tuple[str, ...]] = {
     f"{_H}/peers/forwarded_goals.py": (f"{_TH}/peers/test_forwarded_goals.py",),
     f"{_H}/peers/goals.py": (f"{_TH}/peers/test_goals.py",),
     f"{_H}/peers/asking.py": (f"{_TH}/peers/test_asking.py",),
+    f"{_H}/peers/translating.py": (f"{_TH}/peers/test_translating.py",),
     f"{_H}/peers/pairing_requests.py": (f"{_TH}/peers/test_pairing_requests.py",),
     f"{_H}/peers/trust_store.py": (f"{_TH}/peers/test_trust_store.py",),
     f"{_H}/peers/placement/fetching.py": (f"{_TH}/peers/placement/test_fetching.py",),

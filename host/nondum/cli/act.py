@@ -111,7 +111,7 @@ def _told(session: Session, said: str, given: dict[str, Any], priority: int, *, 
         _show_answer(session, given)
         return 0
     if "id" not in given:
-        given = _confirmed(session, said, given["understood"], priority)
+        given = _confirmed(session, said, given, priority)
     elif "understood" in given and not session.as_json:
         render.sentence(_understood(given["understood"]))
     return _shown(session, given, wait=wait)
@@ -155,13 +155,15 @@ def _show_answer(session: Session, given: dict[str, Any]) -> None:
 
 
 def _confirmed(
-    session: Session, said: str, understood: dict[str, Any], priority: int
+    session: Session, said: str, answer: dict[str, Any], priority: int
 ) -> dict[str, Any]:
     """Ask the person whether they were understood, and give just that goal."""
+    understood = answer["understood"]
     if session.as_json or not sys.stdin.isatty():
         fix = "give --yes to take it so, or the goal with --pddl"
         raise GoalRefused(Problem("TRANSLATION_UNCONFIRMED", _understood(understood), fix=fix))
     render.sentence(_understood(understood))
+    render.sentence(answer["would"]["said"])
     if not click.confirm("Is that what is wanted?"):
         raise GoalRefused(Problem("TRANSLATION_UNCONFIRMED", "nothing was asked for", where=said))
     goal, kind = understood["goal"], understood["kind"]

@@ -9,10 +9,12 @@ import pytest
 from tests.host.mind.robot import Robot
 from tests.planning.strangers import COMPTON_CAMERA, PAN_TILT_UNIT, SPEAKER
 
-from nondum.host.mind.component_plugins import ComponentPlugins
+from nondum.host.mind.component_plugins import Ask, ComponentPlugins
 from nondum.host.mind.composition import compose
 from nondum.host.mind.planners import Planners
+from nondum.host.mind.translation import gathered
 from nondum.planning.merge.contribution import Contribution
+from nondum.sdk.errors import NondumError, Problem
 
 pytestmark = pytest.mark.anyio
 
@@ -32,9 +34,13 @@ def robot() -> Robot:
     return robot
 
 
-def plugins_of(robot: Robot) -> ComponentPlugins:
+async def failing(component: str, hook: str, body: Mapping[str, Any]) -> Mapping[str, Any]:
+    raise NondumError(Problem("PEER_GONE", f"{component} is not there"))
+
+
+def plugins_of(robot: Robot, ask: Ask = asked) -> ComponentPlugins:
     assert robot.mind.composition is not None
-    plugins = ComponentPlugins(asked)
+    plugins = ComponentPlugins(ask)
     plugins.see(robot.mind.composition.snapshot)
     return plugins
 
@@ -89,3 +95,20 @@ async def test_acting_hook_asks_each_component(hook: str, arguments: dict[str, A
         name: {"of": name, "hook": hook, **arguments}
         for name in ("compton-camera", "pan-tilt-unit")
     }
+
+
+@pytest.mark.parametrize("hook", ["speak", "listen"])
+async def test_component_that_fails_to_speak_or_listen_answers_nothing(hook: str) -> None:
+    arguments = {"text": "hi"} if hook == "speak" else {}
+    said = getattr(plugins_of(robot(), failing).hook, hook)(ctx=None, **arguments)
+    assert [await one.value for one in said] == [None, None]
+
+
+async def test_component_that_fails_to_translate_says_why() -> None:
+    answers = plugins_of(robot(), failing).translations("hi", {})
+    found, problems = await gathered(answers, 60)
+    assert not found
+    assert [(p.code, p.where) for p in problems] == [
+        ("TRANSLATION_FAILED", "compton-camera"),
+        ("TRANSLATION_FAILED", "pan-tilt-unit"),
+    ]

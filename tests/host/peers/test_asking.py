@@ -2,47 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import pytest
+from tests.host.peers.one_peer import OnePeer, incoming
 
 from nondum.host.peers.asking import METHOD, Asking
-from nondum.host.peers.dispatch import Dispatcher
 from nondum.host.peers.goals import MAX_WORDS
 from nondum.sdk.errors import GoalRefused, HostUnreachable, Problem
 from nondum.sdk.wire import Body
-from nondum.transport.peers import Admission, Call, CallFailed, IncomingCall, PeerKey
-from nondum.transport.peers.messages import Request
+from nondum.transport.peers import CallFailed, IncomingCall
 
 pytestmark = pytest.mark.anyio
 
 ABLE = "I can follow you."
-
-
-class OnePeer:
-    """Reaches one peer, which serves these calls."""
-
-    def __init__(self, serves: dict[str, Any]) -> None:
-        self.requests = Dispatcher()
-        for method, serve in serves.items():
-            self.requests.add(method, serve)
-
-    def call(self, host: str, method: str, args: Body, *, deadline_s: float) -> Call:
-        async def called() -> Body:
-            answer = self.requests.serve(incoming(method, args))
-            return answer if isinstance(answer, Mapping) else await answer
-
-        return cast(Call, asyncio.ensure_future(called()))
-
-    def notify(self, host: str, method: str, args: Body) -> None:
-        raise AssertionError(f"{host} is told {method}")
-
-
-def incoming(method: str, args: Body) -> IncomingCall:
-    admission = Admission(PeerKey("rover"), "rover", "pairing")
-    return IncomingCall(admission, Request(1, 1, 60_000, method, args), lambda _, __: None)
 
 
 async def able(words: str) -> str | None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
+from nondum.host.mind.component_plugins import Answers
 from nondum.host.mind.mind import Mind
 from nondum.host.peers.forwarded_goals import MOST_KEPT
 from nondum.host.peers.goals import MAX_WORDS, Goals
@@ -29,6 +31,10 @@ class NoPeer:
 
 def no_mind() -> Mind:
     raise AssertionError("a goal is made of it")
+
+
+def no_translations(words: str, vocabulary: Mapping[str, Any]) -> Answers:
+    raise AssertionError("words were translated")
 
 
 def no_stop() -> Stopped:
@@ -56,7 +62,7 @@ def asked(words: object) -> IncomingCall:
 async def test_words_that_are_not_taken_become_no_goal(
     words: Any, accepts: bool, code: str
 ) -> None:
-    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=accepts)
+    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=accepts)
     with pytest.raises(CallFailed, match=code):
         goals.serve_give(asked(words))
     with pytest.raises(CallFailed, match=code):
@@ -65,7 +71,7 @@ async def test_words_that_are_not_taken_become_no_goal(
 
 @pytest.mark.parametrize("priority", [1001, -1001, True, "1", 1.5])
 async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> None:
-    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=True)
+    goals = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=True)
     incoming = asked("blink")
     incoming.args["priority"] = priority
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):
@@ -78,7 +84,11 @@ async def test_goal_of_no_priority_that_there_is_is_refused(priority: Any) -> No
     ids=["nothing", "number", "list", "none", "too many"],
 )
 async def test_peer_that_is_back_asks_after_goals_by_id(goals: Any) -> None:
-    goals_here = Goals("mule", no_mind, NoPeer(), lambda: (), no_stop, accepts=True)
+    goals_here = Goals(
+        "mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=True
+    )
+        "mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=True
+    )
     incoming = asked("blink")
     incoming.args["goals"] = goals
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):

@@ -21,11 +21,13 @@ from nondum.host.core.records.peer import PeerComponent, PeerRecord
 from nondum.host.core.records.step import Step
 from nondum.host.mind.announcements import Told
 from nondum.host.mind.lack import Need
+from nondum.host.mind.preview import Preview, preview
 from nondum.host.people.answering import Answering
 from nondum.host.people.answers import LONGEST, abilities, activity, of_the_robot
 from nondum.host.people.feedback.state_reasons import Known
 from nondum.host.people.hosts_here import hosts_here
 from nondum.host.people.pulling import pulling
+from nondum.host.people.reading_back import read_back
 from nondum.host.people.recent import recent
 from nondum.sdk.description import Label, PluginDescription
 from nondum.sdk.errors import Problem
@@ -297,7 +299,42 @@ def test_robot_says_who_is_here(golden: Golden) -> None:
         return PeerRecord("key", name, "address", "pairing", "life", offered)
 
     golden.check("who: no other host", hosts_here("rover", ()))
-    golden.check("who: one with two components", hosts_here("rover", (peer("mule", "eye", "ear"),)))
+    golden.check(
+        "who: one with two components", hosts_here("rover", (peer("mule", "eye", "lamp"),))
+    )
     two = (peer("mule", "a", "b", "c", "d"), peer("llama"))
     golden.check("who: two", hosts_here("rover", two))
     golden.check("who: thirty", hosts_here("rover", [peer(f"mule-{n:02}") for n in range(30)]))
+
+
+@pytest.mark.anyio
+async def test_robot_says_what_it_would_do_before_it_is_told_to(
+    robot: Robot, golden: Golden
+) -> None:
+    def told(words: str) -> str:
+        mind, composition = robot.mind, robot.mind.composition
+        assert composition is not None
+        goal = composition.book.goal(words)
+        world = mind.beliefs.world
+        seen = preview(composition, goal, world.facts, world.bare_facts, (), mind.names)
+        return read_back(words, seen)
+
+    robot.plug(POINTING, SENSING)
+    golden.check("it would point", told(POINT), point=POINT)
+    robot.mind.give(words=POINT)
+    await robot.until_holding()
+    golden.check("it would point, which it does already", told(POINT), point=POINT)
+    robot.set_state("pan-tilt-unit", ComponentState.RESTARTING)
+    await robot.until_goal("suspended")
+    golden.check("it would point, but has no head", told(POINT), point=POINT)
+
+
+def test_what_a_robot_would_do_is_short_enough_to_be_spoken(golden: Golden) -> None:
+    steps = tuple(f"component-{n}.do" for n in range(9))
+    components = tuple(f"component-{n}@mule" for n in range(9))
+    golden.check(
+        "nine steps at a peer", read_back("look for me", Preview("can", steps, components))
+    )
+    golden.check("two steps", read_back("sing", Preview("can", steps[:2], ("choir",))))
+    golden.check("PDDL", read_back("(lit rover)", Preview("can", ("lamp.shine",), ("lamp",))))
+    golden.check("too many ways", read_back("sing", Preview("unknown")))

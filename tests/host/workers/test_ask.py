@@ -1,4 +1,4 @@
-"""Acting hooks are asked of a component's worker, and never raise."""
+"""Acting hooks are asked of a component's worker; one that fails says why."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from tests.kit.workers import WorkersUnderTest
 
 from nondum.sdk.description import Unit
+from nondum.sdk.errors import NondumError
 
 pytestmark = pytest.mark.anyio
 
@@ -38,10 +39,11 @@ async def test_worker_answers_for_its_component(tested: WorkersUnderTest) -> Non
     assert await tested.workers.ask("talker", "speak", {"text": "hi"}) == {}
 
 
-async def test_failing_hook_comes_to_nothing(tested: WorkersUnderTest) -> None:
+async def test_failing_hook_says_why(tested: WorkersUnderTest) -> None:
     await talker(tested)
     body = {**HELLO, "words": "boom"}
-    assert await tested.workers.ask("talker", "translate_goal", body) is None
+    with pytest.raises(NondumError, match="division by zero"):
+        await tested.workers.ask("talker", "translate_goal", body)
 
 
 async def test_hook_of_a_worker_that_goes_comes_to_nothing(tested: WorkersUnderTest) -> None:

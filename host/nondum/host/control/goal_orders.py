@@ -20,12 +20,14 @@ from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import HIGHEST_PRIORITY, GivenGoal
 from nondum.host.mind.mind import Mind
+from nondum.host.mind.preview import Preview, preview
 from nondum.host.mind.translation import Understood
 from nondum.host.people.conversation import Reply, Take
 from nondum.host.people.goal_files import GoalFiles, why_kept
+from nondum.host.people.reading_back import read_back
 from nondum.host.people.stopping import Stopped, Stopping, is_stop_for_stranger, said_to
 from nondum.host.workers.workers import Workers
-from nondum.planning.merge.goal import GoalKind
+from nondum.planning.merge.goal import GoalKind, parse_goal
 from nondum.planning.words.stop_words import is_stop
 from nondum.sdk.errors import GoalRefused, Problem
 from nondum.sdk.frozen import frozen
@@ -50,7 +52,7 @@ class GoalOrders:
     take: Take
     """Makes goals of words that are heard, here or at a peer."""
     translate_s: float
-    """Time that components have to translate words."""
+    """Time that components and peers have to translate words."""
     goal_files: Callable[[], GoalFiles]
     """Keeps words that mean nothing yet."""
     elsewhere: Elsewhere | None
@@ -61,7 +63,8 @@ class GoalOrders:
 
         Words that only a peer can have, or that begin with its name, are given to it: `host` says
         whose goal it is. Words that match no phrase are translated; with `yes` the goal is given as
-        it was understood, else the answer has `understood` only, for the person to confirm. With
+        it was understood, else the answer has `understood`, for the person to confirm, and what the
+        robot `would` do. With
         `keep`, words that mean nothing yet are kept; with `wait`, while anything is being brought
         in. Words that stop the robot do, and the answer has `stopped` only; a question about itself
         is answered, with `answer` only. Raises `GoalRefused`.
@@ -120,7 +123,12 @@ class GoalOrders:
         except GoalRefused as unknown:
             return self._kept(words, priority, unknown, arguments)
         if not arguments.flag("yes"):
-            return {"understood": understood.to_dict()}
+            would = await self._previewed(understood)
+            said = read_back(understood.words or understood.pddl, would)
+            return {
+                "understood": understood.to_dict(),
+                "would": {**would.to_dict(), "said": said},
+            }
         self.mind.people.tell(f"{words!r} is {understood}")
         given = self.mind.give(
             pddl=understood.pddl, kind=understood.kind, priority=priority, said=words
@@ -203,10 +211,26 @@ class GoalOrders:
         return await translation.translated(
             words,
             refused,
-            lambda vocabulary: self.mind.plugins.translations(words, vocabulary),
+            lambda vocabulary: {
+                **self.mind.plugins.translations(words, vocabulary),
+                **(self.elsewhere.translations(words, vocabulary) if self.elsewhere else {}),
+            },
             composition,
             deadline_s=self.translate_s,
         )
+
+    async def _previewed(self, understood: Understood) -> Preview:
+        """What would become of a goal that a person has not confirmed yet."""
+        mind = self.mind
+        composition, world = mind.composition, mind.beliefs.world
+        if composition is None:
+            return Preview("unknown")
+        try:
+            goal = parse_goal(understood.pddl, composition.merged, kind=understood.kind)
+        except GoalRefused:  # what it speaks of has just gone
+            return Preview("unknown")
+        known = (world.facts, world.bare_facts, tuple(mind.pursuit.seen), mind.names)
+        return await asyncio.to_thread(preview, composition, goal, *known)
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""

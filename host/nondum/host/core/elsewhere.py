@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from typing import Protocol
+from collections.abc import AsyncIterator, Awaitable, Mapping
+from typing import Any, Protocol
 
 from nondum.host.core.row import Row
 
@@ -27,6 +27,12 @@ class Elsewhere(Protocol):
 
     def given(self) -> list[Row]:
         """The goals that were given to peers, as they were last heard of."""
+        ...
+
+    def translations(
+        self, words: str, vocabulary: Mapping[str, Any]
+    ) -> Mapping[str, Awaitable[Mapping[str, Mapping[str, Any]]]]:
+        """Have the components of every peer translate words: peer → component → its answer."""
         ...
 
     def follow(self, peer: str, id: str) -> AsyncIterator[Row]:

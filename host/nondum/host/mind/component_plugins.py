@@ -1,12 +1,14 @@
 """The components that planning knows, as plugins of the host's own pluggy manager.
 
 Describing hooks answer at once, from what the plugin said when it was started or, for a component
-of a peer, what the peer offers. Acting hooks give awaitables, which never raise: they come to None
-where the component does not answer. Each answer says which component gave it.
+of a peer, what the peer offers. Acting hooks give awaitables, which come to None where the
+component does not answer; only that of `translate_goal` raises `NondumError` then, since a person
+asked. Each answer says which component gave it.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Generic, TypeAlias, TypeVar
 
@@ -26,13 +28,21 @@ from nondum.sdk.description import (
     Phrase,
     Unit,
 )
+from nondum.sdk.errors import NondumError
 from nondum.sdk.frozen import frozen
 from nondum.sdk.hooks import hookimpl
 
 Answer: TypeAlias = Awaitable[Mapping[str, Any] | None]
 Ask: TypeAlias = Callable[[str, str, Mapping[str, Any]], Answer]
-"""Asks the worker of a component for a hook: component, hook, its arguments."""
+"""Asks the worker of a component for a hook: component, hook, its arguments. What it gives raises
+`NondumError` where the hook fails."""
+Translations: TypeAlias = Mapping[str, Mapping[str, Any]]
+"""Component → what it makes of words."""
+Answers: TypeAlias = dict[str, Awaitable[Translations]]
+"""Component or peer that was asked → its answers, which raise `NondumError` where it has failed."""
 _T = TypeVar("_T")
+
+log = logging.getLogger(__name__)
 
 
 @frozen
@@ -100,7 +110,8 @@ class ComponentPlugin:
     @hookimpl
     def translate_goal(self, words: str, vocabulary: Mapping[str, Any]) -> Said[Answer]:
         """Have it translate what a person said, with the words that are known now."""
-        return self._asked("translate_goal", {"words": words, "vocabulary": vocabulary})
+        body = {"words": words, "vocabulary": vocabulary}
+        return Said(self.component.id, self._ask(self.component.id, "translate_goal", body))
 
     @hookimpl
     def speak(self, text: str) -> Said[Answer]:
@@ -118,7 +129,14 @@ class ComponentPlugin:
         return self._asked("learn_words", {"vocabulary": vocabulary})
 
     def _asked(self, hook: str, body: Mapping[str, Any]) -> Said[Answer]:
-        return Said(self.component.id, self._ask(self.component.id, hook, body))
+        return Said(self.component.id, self._answered(hook, body))
+
+    async def _answered(self, hook: str, body: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        try:
+            return await self._ask(self.component.id, hook, body)
+        except NondumError as error:
+            log.warning("%s does not answer %s: %s", self.component.id, hook, error)
+            return None
 
 
 class ComponentPlugins:
@@ -153,12 +171,13 @@ class ComponentPlugins:
         found = self.manager.get_plugin(component)
         return found if isinstance(found, ComponentPlugin) else None
 
-    def translations(self, words: str, vocabulary: Mapping[str, Any]) -> dict[str, Answer]:
-        """Ask every component to translate what a person said: component → its answer."""
-        said: list[Said[Answer]] = self.hook.translate_goal(
-            ctx=None, words=words, vocabulary=vocabulary
-        )
-        return {one.component: one.value for one in sorted(said, key=lambda one: one.component)}
+    def translations(self, words: str, vocabulary: Mapping[str, Any]) -> Answers:
+        """Ask every component of this host to translate what a person said."""
+        plugins = self.manager.get_plugins()
+        peers = [one for one in plugins if isinstance(one.component, PeerComponent)]
+        translate = self.manager.subset_hook_caller("translate_goal", peers)
+        said: list[Said[Answer]] = translate(ctx=None, words=words, vocabulary=vocabulary)
+        return {one.component: _translation(one) for one in said}
 
     def contributions(self) -> tuple[Contribution, ...]:
         """What each component brings to planning, as the hooks say."""
@@ -177,6 +196,11 @@ class ComponentPlugins:
     def _said(self, hook: str) -> dict[str, Any]:
         answers: list[Said[Any]] = getattr(self.hook, hook)()
         return {answer.component: answer.value for answer in answers}
+
+
+async def _translation(said: Said[Answer]) -> Translations:
+    answer = await said.value
+    return {said.component: answer} if answer else {}
 
 
 _DESCRIBING = ("describe", "fragments", "units", "behaviours", "phrases", "labels")

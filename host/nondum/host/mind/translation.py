@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any, TypeAlias, cast, get_args
 
+from nondum.host.mind.component_plugins import Answers
 from nondum.host.mind.composition import Composition
 from nondum.planning.merge.domain import Predicate
 from nondum.planning.merge.goal import GoalKind, goal_text, parse_goal
@@ -21,7 +22,7 @@ from nondum.planning.pddl.syntax import type_text
 from nondum.planning.words.near import Near, nearest
 from nondum.planning.words.pattern import Slot, with_slots
 from nondum.planning.words.phrases import Phrasebook
-from nondum.sdk.errors import GoalRefused, Problem
+from nondum.sdk.errors import GoalRefused, NondumError, Problem
 from nondum.sdk.frozen import frozen
 
 UNMATCHED = frozenset({"PHRASE_UNKNOWN", "PHRASE_WORDS_UNKNOWN"})
@@ -33,10 +34,8 @@ VOCABULARY_BYTES = 40_000
 _ENTRIES = 400
 
 Vocabulary: TypeAlias = dict[str, Any]
-Answers: TypeAlias = Mapping[str, Awaitable[Mapping[str, Any] | None]]
-"""Component → its answer, once it has one; None where it has failed."""
 Asked: TypeAlias = Callable[[Vocabulary], Answers]
-"""Asks all components at once."""
+"""Asks all components, and peers, at once."""
 
 
 @frozen
@@ -90,12 +89,12 @@ async def translated(
     """Have components translate what matched no phrase; one that hangs is cut off.
 
     `refused` is why it did not. Raises `GoalRefused` with that, and with what is wrong with
-    the answers (TRANSLATION_INVALID, TRANSLATION_REFUSED, TRANSLATION_OVERDUE), or with
-    TRANSLATION_AMBIGUOUS.
+    the answers (TRANSLATION_INVALID, TRANSLATION_REFUSED, TRANSLATION_FAILED, TRANSLATION_OVERDUE),
+    or with TRANSLATION_AMBIGUOUS.
     """
     if refused.code not in UNMATCHED or len(words) > LONGEST_WORDS:
         raise refused
-    answers, problems = await _gathered(ask(vocabulary(composition())), deadline_s)
+    answers, problems = await gathered(ask(vocabulary(composition())), deadline_s)
     found: dict[tuple[str, GoalKind], Understood] = {}
     for component, answer in sorted(answers.items()):
         try:
@@ -155,31 +154,35 @@ def _declared(predicate: Predicate) -> str:
     return f"({' '.join((predicate.name, *typed))})"
 
 
-async def _gathered(
+async def gathered(
     asked: Answers, deadline_s: float
 ) -> tuple[dict[str, Mapping[str, Any]], list[Problem]]:
-    """The answers that say something, and a problem for each component that is cut off."""
-    tasks = {
-        component: asyncio.ensure_future(_awaited(answer)) for component, answer in asked.items()
-    }
+    """The answers that say something, by component, and a problem for each that failed or is cut
+    off."""
+    tasks = {who: asyncio.ensure_future(answer) for who, answer in sorted(asked.items())}
+    answers: dict[str, Mapping[str, Any]] = {}
+    problems: list[Problem] = []
     try:
         if tasks:
             await asyncio.wait(tasks.values(), timeout=deadline_s)
-        overdue = [
-            Problem("TRANSLATION_OVERDUE", f"no answer within {deadline_s:g} s", where=component)
-            for component, task in sorted(tasks.items())
-            if not task.done()
-        ]
-        answers = {c: task.result() for c, task in tasks.items() if task.done()}
+        for who, task in tasks.items():
+            try:
+                answers |= task.result()
+            except asyncio.InvalidStateError:
+                told = f"no answer within {deadline_s:g} s"
+                problems.append(Problem("TRANSLATION_OVERDUE", told, where=who))
+            except NondumError as error:
+                problems.append(_failed(who, error.problems[0]))
     finally:
         for task in tasks.values():
             task.cancel()
         await asyncio.gather(*tasks.values(), return_exceptions=True)
-    return {component: answer for component, answer in answers.items() if answer}, overdue
+    return answers, problems
 
 
-async def _awaited(answer: Awaitable[Mapping[str, Any] | None]) -> Mapping[str, Any] | None:
-    return await answer
+def _failed(who: str, problem: Problem) -> Problem:
+    told = f"{problem.code} {problem.message.splitlines()[0][:200]}"
+    return Problem("TRANSLATION_FAILED", told, where=who, fix=problem.fix)
 
 
 def _checked(component: str, answer: Mapping[str, Any], composition: Composition) -> Understood:

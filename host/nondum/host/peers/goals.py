@@ -16,6 +16,7 @@ from nondum.host.core.events.goals import GoalEnded, GoalReached, PlanMissing
 from nondum.host.core.events.peers import PeerJoined, PeerLeft
 from nondum.host.core.printable import printable
 from nondum.host.core.row import Row
+from nondum.host.mind.component_plugins import Answers
 from nondum.host.mind.goals import HIGHEST_PRIORITY
 from nondum.host.mind.mind import Mind
 from nondum.host.mind.offers import prospect
@@ -48,10 +49,13 @@ class Goals:
         reach: Reaches,
         peers: Callable[[], Sequence[str]],
         stop: Callable[[], Stopped],
+        translations: Callable[[str, Mapping[str, Any]], Answers],
         *,
         accepts: bool,
     ) -> None:
-        """`stop` stops this host; `accepts`: whether goals that peers heard are taken."""
+        """`stop` stops this host; `translations` has peers translate words; `accepts`: whether
+        goals that peers heard are taken."""
+        self.translations = translations
         self._host, self._mind, self._reach, self._peers = host, mind, reach, peers
         self._stop = stop
         self._accepts = accepts

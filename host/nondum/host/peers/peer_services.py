@@ -19,7 +19,7 @@ from nondum.host.jobs.children import Children
 from nondum.host.manager.state_folders import Folders
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.mind import Mind
-from nondum.host.peers import asking, trust_orders
+from nondum.host.peers import asking, translating, trust_orders
 from nondum.host.peers.asking import Asking
 from nondum.host.peers.compute import Compute, probed
 from nondum.host.peers.dispatch import Dispatcher
@@ -37,6 +37,7 @@ from nondum.host.peers.remote_calls import AllCalls, RemoteCalls
 from nondum.host.peers.serving import Serving
 from nondum.host.peers.stream_requests import StreamRequests
 from nondum.host.peers.streams.bridge import Bridge, with_port
+from nondum.host.peers.translating import Translating
 from nondum.host.peers.trust_orders import TrustOrders
 from nondum.host.peers.trust_store import PeerTrustStore
 from nondum.host.peers.uses import uses_of
@@ -172,9 +173,15 @@ class PeerServices:
     def _make_goals(self, config: HostConfig, stop: Callable[[], Stopped], answer: Reply) -> None:
         """Goals that people give here for peers, and there for this host; questions likewise."""
         names, accepts = self.peering.names, config.peers.accept_goals
-        self.goals = Goals(self._host, self._mind, self.peering, names, stop, accepts=accepts)
+        translator = Translating(
+            self._mind, self.peering, names, deadline_s=config.planning.translate_s
+        )
+        self.goals = Goals(
+            self._host, self._mind, self.peering, names, stop, translator.ask, accepts=accepts
+        )
         self.asking = Asking(self.peering, names, answer)
         self.requests.add(asking.METHOD, self.asking.serve)
+        self.requests.add(translating.METHOD, translator.serve)
         self.requests.add("goal.ask", self.goals.serve_ask)
         self.requests.add("goal.give", self.goals.serve_give)
         self.requests.add("goal.again", self.goals.serve_again)

@@ -108,7 +108,7 @@ def _lacking(rows: Iterable[Row]) -> list[str]:
     for row in concrete:
         if any(need["waits"] for need in row["needs"]):  # that is said of the component
             continue
-        need = next(filter(None, map(_need, row["needs"])), "")
+        need = next(filter(None, map(need_in_words, row["needs"])), "")
         wanted.setdefault(need, {}).setdefault(row["goal"], of_the_robot(as_said(row["words"])))
     return [
         f"to {few(list(words.values()), 2)} I need {need}"
@@ -127,12 +127,12 @@ def wish_lacks(row: Row) -> str:
     return next(iter(_lacking([row])), f"I cannot {of_the_robot(as_said(row['words']))} now")
 
 
-def _need(need: Row) -> str:
+def need_in_words(need: Row) -> str:
     """What is missing, by a row of `Need`; empty where that cannot be said shortly.
 
-    >>> _need({"code": "WHY_NO_OBJECT", "types": ["image", "class"], "fact": ""})
+    >>> need_in_words({"code": "WHY_NO_OBJECT", "types": ["image", "class"], "fact": ""})
     'an image or a class'
-    >>> _need({"code": "WHY_NOT_SO", "types": [], "fact": "ready rover__turret__head"})
+    >>> need_in_words({"code": "WHY_NOT_SO", "types": [], "fact": "ready rover__turret__head"})
     'the head to be ready'
     """
     predicate, arguments = parts(need["fact"])
@@ -153,7 +153,7 @@ def pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
     running = [row["component"] for row in steps if row["component"]]
     names = listed(list(dict.fromkeys(name.split("@")[0] for name in running)))
     if goal["state"] == "suspended":
-        if need := first and _need(first):
+        if need := first and need_in_words(first):
             yield f"{head}, but for that I need {need}"
         yield f"{head}, but I cannot now{f': {why}' if why else ''}"
         yield f"{head}, but I cannot now"

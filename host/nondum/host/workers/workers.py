@@ -306,16 +306,16 @@ class Workers:
     async def ask(
         self, component: str, hook: str, body: Mapping[str, Any]
     ) -> Mapping[str, Any] | None:
-        """What a component's plugin answers to an acting hook; None if it does not answer."""
+        """What a component's plugin answers to an acting hook; None if no worker runs.
+
+        Raises `NondumError` where the hook fails.
+        """
         link = self._links.get(component)
         if link is None:
             return None
         try:
             return await link.request(hook, body)
         except errors.LinkClosed:  # it has ended or was taken away, which its own events tell
-            return None
-        except errors.NondumError as error:
-            log.warning("%s does not answer %s: %s", component, hook, error)
             return None
 
     async def keep_spare(self) -> None:

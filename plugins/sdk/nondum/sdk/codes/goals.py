@@ -105,6 +105,11 @@ CODES = (
         "say it in other words, or give the goal with --pddl",
     ),
     Code(
+        "TRANSLATION_FAILED",
+        "The language plugin, or the host that it runs on, could not translate the words.",
+        "say it in words that are listed by `nondum goals`; the message tells what to mend",
+    ),
+    Code(
         "TRANSLATION_INVALID",
         "What the language plugin made of the words is no goal.",
         "say it in other words, or give the goal with --pddl",
