@@ -87,8 +87,6 @@ async def test_peer_that_is_back_asks_after_goals_by_id(goals: Any) -> None:
     goals_here = Goals(
         "mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=True
     )
-        "mule", no_mind, NoPeer(), lambda: (), no_stop, no_translations, accepts=True
-    )
     incoming = asked("blink")
     incoming.args["goals"] = goals
     with pytest.raises(CallFailed, match="CALL_MALFORMED"):

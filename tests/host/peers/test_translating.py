@@ -115,10 +115,12 @@ async def test_what_cannot_be_translated_is_refused(args: dict[str, Any]) -> Non
 
 async def test_one_sentence_of_a_peer_is_translated_at_a_time() -> None:
     async def asks_again(component: str, hook: str, body: Mapping[str, Any]) -> None:
-        with pytest.raises(CallFailed, match="PEER_BUSY"):
-            await busy.serve(incoming(METHOD, dict(body)))
+        if body["words"] == "first":
+            again = dict(body) | {"words": "second"}
+            with pytest.raises(CallFailed, match="PEER_BUSY"):
+                await busy.serve(incoming(METHOD, again))
 
     busy = node(asks_again)
-    body = {"words": "hi", "vocabulary": VOCABULARY}
-    for _ in range(2):
+    for words in ("first", "second"):
+        body = {"words": words, "vocabulary": VOCABULARY}
         assert await busy.serve(incoming(METHOD, body)) == {"answers": {}}

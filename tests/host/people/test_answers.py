@@ -299,9 +299,8 @@ def test_robot_says_who_is_here(golden: Golden) -> None:
         return PeerRecord("key", name, "address", "pairing", "life", offered)
 
     golden.check("who: no other host", hosts_here("rover", ()))
-    golden.check(
-        "who: one with two components", hosts_here("rover", (peer("mule", "eye", "lamp"),))
-    )
+    one = (peer("mule", "eye", "lamp"),)
+    golden.check("who: one with two components", hosts_here("rover", one))
     two = (peer("mule", "a", "b", "c", "d"), peer("llama"))
     golden.check("who: two", hosts_here("rover", two))
     golden.check("who: thirty", hosts_here("rover", [peer(f"mule-{n:02}") for n in range(30)]))
