@@ -32,8 +32,9 @@ class Asked:
     """The wish that "why can't you …" speaks of; empty: the one that was given last."""
 
 
-ASKED = tuple(question.value for question in Question)
-"""What to say; those who listen are told to hear it."""
+ASKED = (Question.ABILITIES.value, Question.ACTIVITY.value)
+"""What those who listen are told to hear; the others are not told until it is measured how often
+something else is heard as one of them."""
 
 _OTHERS = {
     Question.ABILITIES: (
