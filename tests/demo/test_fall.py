@@ -73,6 +73,18 @@ def test_halts_in_two_ticks_are_a_fault() -> None:
     assert faults(rows) == ["base.work was halted in a later tick"]
 
 
+def test_stream_that_stopped_flowing_a_moment_before_the_loss_is_no_fault() -> None:
+    before = halts(ACTIONS[3])
+    rows = journal(halts=before, loss=halts(*ACTIONS[1:3], lost=(ACTIONS[0],)))
+    assert faults(rows) == []
+
+
+def test_halt_after_the_loss_is_a_fault_whatever_was_halted_before() -> None:
+    loss, late = halts(ACTIONS[1], lost=(ACTIONS[0],)), halts(ACTIONS[2])
+    rows = journal(halts=halts(ACTIONS[3]), loss=loss, late=late)
+    assert faults(rows) == ["tracker.work was halted in a later tick"]
+
+
 def test_what_did_not_need_it_may_go_later() -> None:
     rows = journal(halts=halts(*ACTIONS[1:3], lost=(ACTIONS[0],)), late=halts(ACTIONS[3]))
     assert list(Fall.of(rows).faults(ACTIONS[:3], LEFT)) == []

@@ -132,6 +132,7 @@ class Installed:
             if self.until(f"{payload} or a stalled drive", partial(active_or_stalled, payload)):
                 return stick
             self.machine.pull(stick)
+            self.until("the stalled drive gone", none_stalled)
         raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
 
     def components(self) -> list[View]:
@@ -208,5 +209,10 @@ def active_or_stalled(payload: str, view: View) -> bool | None:
     """Whether it is active; None while it is neither that nor kept from it by its drive."""
     if _payload_in(payload, "active", view):
         return True
+    return None if none_stalled(view) else False
+
+
+def none_stalled(view: View) -> bool | None:
+    """Whether no drive that is told of has stalled; None while one has."""
     said = [problem for drive in view["drives"] for problem in drive["problems"]]
-    return False if any(problem.startswith(STARVED) for problem in said) else None
+    return None if any(problem.startswith(STARVED) for problem in said) else True

@@ -17,7 +17,7 @@ from demo.robot import Robot, View
 from demo.stage import INSTALL_S
 from tests.lab.agent import MachineSilent
 from tests.lab.drives import fat_stick
-from tests.lab.installed import PATIENCE_S, REPLUGS, Installed, active_or_stalled
+from tests.lab.installed import PATIENCE_S, REPLUGS, Installed, active_or_stalled, none_stalled
 
 LATEST = "/run/lab/view.json"
 FOLLOW = f"""
@@ -85,6 +85,7 @@ class MachineRobot(Robot):
                 self._sticks[drive.name] = stick
                 return drive.name
             self.machine.pull(stick)
+            self.until("the stalled drive gone", _is_gone, timeout_s=INSTALL_S)
         raise AssertionError(f"the drive of {payload} stalled {REPLUGS} times")
 
     def pull(self, name: str) -> None:
@@ -157,3 +158,7 @@ class MachineRobot(Robot):
 def _has_worked(payload: str, view: View) -> str | None:
     """`yes` or `no` as soon as it is known."""
     return {True: "yes", False: "no", None: None}[active_or_stalled(payload, dict(view))]
+
+
+def _is_gone(view: Mapping[str, Any]) -> bool | None:
+    return none_stalled(dict(view))
