@@ -32,8 +32,8 @@ class Fall:
     loss: int
     """The first of these ticks in which a component was gone; the first of all where none was. On a
     slow machine a stream may stop flowing a moment before that, and what reads it goes down."""
-    decided_s: float
-    """When the tick of the loss was (monotonic clock); 0 when there was none."""
+    ticks_s: tuple[float, ...]
+    """When each of these ticks was (monotonic clock)."""
     endings: tuple[Ending, ...]
     exits: tuple[str, ...]
     """Components whose worker ended."""
@@ -49,10 +49,15 @@ class Fall:
                 frozenset({*row["detail"]["halted"], *row["detail"]["lost"]}) for row in halts
             ),
             loss=loss,
-            decided_s=halts[loss]["monotonic"] if halts else 0.0,
+            ticks_s=tuple(row["monotonic"] for row in halts),
             endings=tuple(_ending(row) for row in rows if row["event"] == "BehaviourEnded"),
             exits=tuple(row["subject"] for row in rows if row["event"] == "WorkerExited"),
         )
+
+    @property
+    def decided_s(self) -> float:
+        """When the first of these ticks was (monotonic clock); 0 when there was none."""
+        return self.ticks_s[0] if self.ticks_s else 0.0
 
     @property
     def took_s(self) -> float:
@@ -80,8 +85,15 @@ class Fall:
             yield f"what {component} did has not ended"
         elif ending.outcome != "HALTED":
             yield f"what {component} did {ending.outcome.lower()}"
-        elif ending.at_s - self.decided_s > HALTED_S:
-            yield f"what {component} did took {ending.at_s - self.decided_s:.1f} s to end"
+        elif (took_s := ending.at_s - self._asked_s(component)) > HALTED_S:
+            yield f"what {component} did took {took_s:.1f} s to end"
+
+    def _asked_s(self, component: str) -> float:
+        """When the behaviour of a component was asked to end: in the first tick in which one of its
+        actions went down."""
+        fell = zip(self.ticks, self.ticks_s, strict=True)
+        of_it = (at for tick, at in fell if any(a.startswith(f"{component}.") for a in tick))
+        return next(of_it, self.decided_s)
 
 
 def _ending(row: Row) -> Ending:

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.daemon
 
 Hosts = list[RunningHost]
 INTERPRETER = """
-'''Understands what it is told to, of any host.'''
+'''Translates each sentence to `shine`, where a host has that phrase.'''
 from nondum.sdk import hookimpl
 
 @hookimpl

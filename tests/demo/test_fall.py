@@ -85,6 +85,12 @@ def test_halt_after_the_loss_is_a_fault_whatever_was_halted_before() -> None:
     assert faults(rows) == ["tracker.work was halted in a later tick"]
 
 
+def test_time_to_end_counts_from_the_tick_in_which_each_was_asked() -> None:
+    before = row("BehavioursHalted", at_s=9.0, tick=6, halted={ACTIONS[3]: "no stream"}, lost={})
+    rows = journal(halts=before, loss=halts(*ACTIONS[1:3], lost=(ACTIONS[0],)))
+    assert faults(rows) == ["what base did took 1.0 s to end"]
+
+
 def test_what_did_not_need_it_may_go_later() -> None:
     rows = journal(halts=halts(*ACTIONS[1:3], lost=(ACTIONS[0],)), late=halts(ACTIONS[3]))
     assert list(Fall.of(rows).faults(ACTIONS[:3], LEFT)) == []

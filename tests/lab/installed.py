@@ -213,6 +213,6 @@ def active_or_stalled(payload: str, view: View) -> bool | None:
 
 
 def none_stalled(view: View) -> bool | None:
-    """Whether no drive that is told of has stalled; None while one has."""
+    """True once no drive in the status has stalled; None while one has."""
     said = [problem for drive in view["drives"] for problem in drive["problems"]]
     return None if any(problem.startswith(STARVED) for problem in said) else True

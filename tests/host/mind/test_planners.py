@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -445,9 +446,12 @@ async def test_killed_planner_comes_back(planner: Make, task: GroundTask) -> Non
     process = planner("pyperplan")
     await process.plan(Request(task), 5.0)
     assert process.pid is not None
-    os.kill(process.pid, 9)
+    os.kill(process.pid, signal.SIGSTOP)
+    asked = asyncio.create_task(process.plan(Request(task), 5.0))
+    await asyncio.sleep(0)  # it has the task, and cannot answer
+    os.kill(process.pid, signal.SIGKILL)
     with pytest.raises(PlannerFailed):
-        await process.plan(Request(task), 5.0)
+        await asked
     assert isinstance(await process.plan(Request(task), 5.0), Plan)
 
 

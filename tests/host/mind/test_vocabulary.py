@@ -1,4 +1,4 @@
-"""What translators are told is what plugins declare: nothing that a sensor or a person has said."""
+"""Translators get what plugins declare, and neither sensor readings nor earlier sentences."""
 
 from __future__ import annotations
 

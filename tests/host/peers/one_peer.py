@@ -28,7 +28,7 @@ class OnePeer:
         return cast(Call, asyncio.ensure_future(called()))
 
     def notify(self, host: str, method: str, args: Body) -> None:
-        raise AssertionError(f"{host} is told {method}")
+        raise AssertionError(f"{host} serves calls only, and got the notice {method}")
 
 
 def incoming(method: str, args: Body) -> IncomingCall:

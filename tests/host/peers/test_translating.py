@@ -63,7 +63,7 @@ async def test_failure_of_all_translators_of_a_peer_is_told() -> None:
     answers, problems = await gathered(rover(node(broken).serve).ask("hi", VOCABULARY), 60)
     assert not answers
     (problem,) = problems
-    assert (problem.code, problem.where) == ("TRANSLATION_FAILED", "mule")
+    assert (problem.code, problem.where) == ("TRANSLATION_FAILED", "speaker@mule")
     assert "ENDPOINT_SILENT" in problem.message
 
 

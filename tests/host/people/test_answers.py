@@ -21,11 +21,12 @@ from nondum.host.core.records.peer import PeerComponent, PeerRecord
 from nondum.host.core.records.step import Step
 from nondum.host.mind.announcements import Told
 from nondum.host.mind.lack import Need
-from nondum.host.mind.preview import Preview, preview
+from nondum.host.mind.preview import Preview
 from nondum.host.people.answering import Answering
 from nondum.host.people.answers import LONGEST, abilities, activity, of_the_robot
 from nondum.host.people.feedback.state_reasons import Known
 from nondum.host.people.hosts_here import hosts_here
+from nondum.host.people.obstacles import obstacle
 from nondum.host.people.pulling import pulling
 from nondum.host.people.reading_back import read_back
 from nondum.host.people.recent import recent
@@ -230,6 +231,12 @@ async def test_robot_says_what_happened_but_not_what_it_answered(
     assert await answering.answer("what is new") == first
 
 
+@pytest.mark.parametrize("state", ["queued", "kept", "halted"])
+def test_goal_that_waits_says_what_for(golden: Golden, state: str) -> None:
+    golden.check(f"why not, {state}", obstacle([goal("dance", state, "waits for goal 3")]))
+    golden.check(f"why not, {state}, PDDL", obstacle([goal("(lit rover)", state)]))
+
+
 def told_at(*texts: str, every_s: float = 60.0) -> list[Told]:
     return [Told(number, number * every_s, text) for number, text in enumerate(texts, 1)]
 
@@ -314,9 +321,7 @@ async def test_robot_says_what_it_would_do_before_it_is_told_to(
         mind, composition = robot.mind, robot.mind.composition
         assert composition is not None
         goal = composition.book.goal(words)
-        world = mind.beliefs.world
-        seen = preview(composition, goal, world.facts, world.bare_facts, (), mind.names)
-        return read_back(words, seen)
+        return read_back(words, mind.views.preview(goal)())
 
     robot.plug(POINTING, SENSING)
     golden.check("it would point", told(POINT), point=POINT)

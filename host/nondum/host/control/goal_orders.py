@@ -20,7 +20,7 @@ from nondum.host.mind import translation
 from nondum.host.mind.composition import Composition
 from nondum.host.mind.goals import HIGHEST_PRIORITY, GivenGoal
 from nondum.host.mind.mind import Mind
-from nondum.host.mind.preview import Preview, preview
+from nondum.host.mind.preview import Preview
 from nondum.host.mind.translation import Understood
 from nondum.host.people.conversation import Reply, Take
 from nondum.host.people.goal_files import GoalFiles, why_kept
@@ -221,16 +221,14 @@ class GoalOrders:
 
     async def _previewed(self, understood: Understood) -> Preview:
         """What would become of a goal that a person has not confirmed yet."""
-        mind = self.mind
-        composition, world = mind.composition, mind.beliefs.world
-        if composition is None:
+        if self.mind.composition is None:
             return Preview("unknown")
+        kind, merged = understood.kind, self.mind.composition.merged
         try:
-            goal = parse_goal(understood.pddl, composition.merged, kind=understood.kind)
+            goal = parse_goal(understood.pddl, merged, kind=kind)
         except GoalRefused:  # what it speaks of has just gone
             return Preview("unknown")
-        known = (world.facts, world.bare_facts, tuple(mind.pursuit.seen), mind.names)
-        return await asyncio.to_thread(preview, composition, goal, *known)
+        return await asyncio.to_thread(self.mind.views.preview(goal))
 
     def answering(self) -> dict[str, Callable[[Arguments], Awaitable[Any]]]:
         """Verbs that answer once."""

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from nondum.host.mind import short_names
 from nondum.host.mind.composition import Composition
-from nondum.host.mind.diagnosis import Seen, why_not
 from nondum.host.mind.lack import Need
-from nondum.host.mind.missing_reports import Silence
-from nondum.planning.ground.delete_relaxation import quick_answer
+from nondum.host.mind.offers import Outlook
 from nondum.planning.ground.ground import ground
 from nondum.planning.merge.goal import Goal
 from nondum.planning.search import solve
-from nondum.sdk.errors import FragmentRefused
 from nondum.sdk.frozen import frozen
 from nondum.sdk.planner import AlreadyTrue, GroundAction, Plan, Unsolvable
 
@@ -30,7 +27,7 @@ class Preview:
     now: str
     """`holds`, `can`, `cannot` or `unknown`, as `offers` has it."""
     steps: tuple[str, ...] = ()
-    """Of a plan for it, as they are told; when it is given, another one may be found."""
+    """The steps of a plan that was found now; once the goal is given, the host may find another."""
     components: tuple[str, ...] = ()
     """Those that would act, in the order of the steps."""
     needs: tuple[Need, ...] = ()
@@ -46,36 +43,28 @@ class Preview:
 def preview(
     composition: Composition,
     goal: Goal,
-    facts: frozenset[str],
+    outlook: Outlook,
     bare_facts: frozenset[str],
-    seen: Iterable[Seen],
     names: Mapping[str, str],
 ) -> Preview:
-    """Plan for a goal beside all that is pursued. `facts` are those that hold, `bare_facts` those
-    that would if nothing ran; `names` are short ones of units. It takes its time, so call it in a
-    thread."""
+    """Plan for a goal beside all that is pursued. `bare_facts` are those that hold while nothing
+    runs, `names` short ones of units. It takes its time, so call it in a thread."""
+    now, why = outlook.of(goal)
+    if now == "cannot":
+        return Preview(now, needs=why.needs)
+    if now == "unknown" or (now == "holds" and goal.kind != "do"):
+        return Preview(now)
     until_s = time.monotonic() + SEARCH_S
-    try:
-        if goal.kind != "do" and _holds(composition, goal, facts):
-            return Preview("holds")
-        task = ground(composition.merged, bare_facts, goal.expr)
-        answer = solve(task, lambda: time.monotonic() > until_s)
-    except FragmentRefused:  # there are too many ways
-        return Preview("unknown")
+    task = ground(composition.merged, bare_facts, goal.expr)
+    answer = solve(task, lambda: time.monotonic() > until_s)
     match answer:
         case AlreadyTrue():
             return Preview("holds")
         case Plan(steps):
             return _planned([task.actions[index] for index in steps], composition, names)
         case Unsolvable():
-            silence = Silence.of(composition.snapshot)
-            why = why_not(composition.merged, goal, bare_facts, seen, silence=silence)
-            return Preview("cannot", needs=why.needs)
+            return Preview("cannot")
     return Preview("unknown")
-
-
-def _holds(composition: Composition, goal: Goal, facts: frozenset[str]) -> bool:
-    return isinstance(quick_answer(ground(composition.merged, facts, goal.expr)), AlreadyTrue)
 
 
 def _planned(

@@ -181,6 +181,8 @@ async def gathered(
 
 
 def _failed(who: str, problem: Problem) -> Problem:
+    if problem.code in ("TRANSLATION_FAILED", "TRANSLATION_OVERDUE"):  # of a peer's component
+        return replace(problem, where=f"{problem.where}@{who}")
     told = f"{problem.code} {problem.message.splitlines()[0][:200]}"
     return Problem("TRANSLATION_FAILED", told, where=who, fix=problem.fix)
 

@@ -18,12 +18,14 @@ from nondum.host.mind.composition import Composition, own_objects
 from nondum.host.mind.frames import implausible
 from nondum.host.mind.goals import GivenGoal, GoalQueue, GoalState
 from nondum.host.mind.missing_reports import Silence
+from nondum.host.mind.preview import Preview, preview
 from nondum.host.mind.pursued import Pursued
 from nondum.host.mind.pursuit import Pursuit
 from nondum.host.mind.runner import BehaviourRunner
 from nondum.host.mind.tree_view import Row, TreeView
 from nondum.planning.execute.plan_executive import Phase
 from nondum.planning.ground.conclusions import conclusions
+from nondum.planning.merge.goal import Goal
 from nondum.sdk.description import Behaviour
 from nondum.sdk.errors import GoalRefused, Problem
 
@@ -147,6 +149,14 @@ class Views:
             raise GoalRefused(Problem("PHRASE_UNKNOWN", f"nothing here understands {words!r}"))
         reading = composition.book.reading(words)
         return lambda: offers.offer([reading], outlook(composition), composition)
+
+    def preview(self, goal: Goal) -> Callable[[], Preview]:
+        """What would become of a goal, worked out by the function that is given, in any thread."""
+        composition, outlook = self._mind.composition, self._outlook()
+        bare_facts, names = self._mind.beliefs.world.bare_facts, self._mind.names
+        if composition is None:
+            return lambda: Preview("unknown")
+        return lambda: preview(composition, goal, outlook(composition), bare_facts, names)
 
     def _outlook(self) -> Callable[[Composition], offers.Outlook]:
         """What can be had by what is believed now, once it is worked out."""

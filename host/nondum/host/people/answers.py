@@ -144,10 +144,19 @@ def need_in_words(need: Row) -> str:
     return ""
 
 
+def asked_for(goal: Row) -> str:
+    """What a person asked for, in words or in PDDL.
+
+    >>> asked_for({"text": "follow me"}), asked_for({"text": "(lit rover)"})
+    ('I was asked to follow you', 'I was asked for (lit rover)')
+    """
+    text = goal["text"]
+    return f"I was asked for {text}" if "(" in text else f"I was asked to {of_the_robot(text)}"
+
+
 def pursued(goal: Row, steps: Sequence[Row]) -> Iterator[str]:
     """What becomes of a goal, shorter and shorter."""
-    text = goal["text"]
-    head = f"I was asked for {text}" if "(" in text else f"I was asked to {of_the_robot(text)}"
+    head = asked_for(goal)
     first = next(iter(goal["needs"]), None)
     why = _in_short_names(str(first["said"] if first else goal["reason"]))
     running = [row["component"] for row in steps if row["component"]]

@@ -24,7 +24,7 @@ def hosts_here(host: str, peers: Iterable[PeerRecord]) -> str:
         return f"I am {host}, and no other host is here."
     verb = "is" if len(known) == 1 else "are"
     each = ([f"{peer.name}{_with(peer)}" for peer in known], [peer.name for peer in known])
-    ways = [*map(listed, each), few(each[1], _MOST), f"{len(known)} hosts"]
+    ways = [*map(listed, each), f"{len(known)} other hosts"]
     return fitting(f"I am {host}, and {names} {verb} here" for names in ways)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from nondum.host.people.answers import Row, fitting, of_the_robot, pursued, wish_lacks
+from nondum.host.people.answers import Row, asked_for, fitting, of_the_robot, pursued, wish_lacks
 
 _WAITING = ("suspended", "queued", "kept")
 
@@ -20,14 +20,20 @@ def obstacle(given: Sequence[Row]) -> str:
     'Nothing keeps me from what I was asked for.'
     """
     waiting = [goal for state in _WAITING for goal in given if goal["state"] == state]
-    if waiting:
+    if waiting and waiting[0]["state"] == "suspended":
         return fitting(pursued(waiting[0], ()))
-    halted = [goal for goal in given if goal["state"] == "halted"]
-    if halted and all(goal["state"] == "halted" for goal in given):
-        last = halted[-1]
-        why = f": {last['reason']}" if last["reason"] else ""
-        return fitting([f"I was asked to {of_the_robot(last['text'])}, and ended it{why}"])
+    if waiting:
+        return fitting(_with_reason(f"{asked_for(waiting[0])}, but not yet", waiting[0]))
+    if given and all(goal["state"] == "halted" for goal in given):
+        return fitting(_with_reason(f"{asked_for(given[-1])}, and ended it", given[-1]))
     return "Nothing keeps me from what I was asked for."
+
+
+def _with_reason(told: str, goal: Row) -> Iterator[str]:
+    """What became of a goal, with the reason where that is short enough."""
+    if goal["reason"]:
+        yield f"{told}: {goal['reason']}"
+    yield told
 
 
 def wish_obstacle(row: Row) -> str:

@@ -33,8 +33,8 @@ class Asked:
 
 
 ASKED = (Question.ABILITIES.value, Question.ACTIVITY.value)
-"""What those who listen are told to hear; the others are not told until it is measured how often
-something else is heard as one of them."""
+"""The questions that those who listen are taught. For the others it is not measured how often a
+recogniser takes another sentence for them."""
 
 _OTHERS = {
     Question.ABILITIES: (
