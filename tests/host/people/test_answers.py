@@ -237,6 +237,10 @@ def test_goal_that_waits_says_what_for(golden: Golden, state: str) -> None:
     golden.check(f"why not, {state}, PDDL", obstacle([goal("(lit rover)", state)]))
 
 
+def test_goal_that_is_pursued_still_is_said_to_be(golden: Golden) -> None:
+    golden.check("why not, active", obstacle([goal("dance", "active")]))
+
+
 def told_at(*texts: str, every_s: float = 60.0) -> list[Told]:
     return [Told(number, number * every_s, text) for number, text in enumerate(texts, 1)]
 

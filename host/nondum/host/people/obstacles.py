@@ -26,6 +26,9 @@ def obstacle(given: Sequence[Row]) -> str:
         return fitting(_with_reason(f"{asked_for(waiting[0])}, but not yet", waiting[0]))
     if given and all(goal["state"] == "halted" for goal in given):
         return fitting(_with_reason(f"{asked_for(given[-1])}, and ended it", given[-1]))
+    at_it = [goal for goal in given if goal["state"] == "active" and not goal["holds"]]
+    if at_it:
+        return fitting(pursued(at_it[0], ()))
     return "Nothing keeps me from what I was asked for."
 
 
