@@ -231,10 +231,19 @@ async def test_robot_says_what_happened_but_not_what_it_answered(
     assert await answering.answer("what is new") == first
 
 
-@pytest.mark.parametrize("state", ["queued", "kept", "halted"])
-def test_goal_that_waits_says_what_for(golden: Golden, state: str) -> None:
-    golden.check(f"why not, {state}", obstacle([goal("dance", state, "waits for goal 3")]))
-    golden.check(f"why not, {state}, PDDL", obstacle([goal("(lit rover)", state)]))
+@pytest.mark.parametrize(
+    ("state", "in_words", "as_formula"),
+    [
+        ("queued", "why not, queued", "why not, queued, PDDL"),
+        ("kept", "why not, kept", "why not, kept, PDDL"),
+        ("halted", "why not, halted", "why not, halted, PDDL"),
+    ],
+)
+def test_goal_that_waits_says_what_for(
+    golden: Golden, state: str, in_words: str, as_formula: str
+) -> None:
+    golden.check(in_words, obstacle([goal("dance", state, "waits for goal 3")]))
+    golden.check(as_formula, obstacle([goal("(lit rover)", state)]))
 
 
 def test_goal_that_is_pursued_still_is_said_to_be(golden: Golden) -> None:
