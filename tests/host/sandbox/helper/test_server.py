@@ -27,7 +27,7 @@ from tests.kit.until import until
 
 from nondum.host.sandbox.cgroups import CgroupLimits, Cgroups
 from nondum.host.sandbox.cgroups.groups import NoTree
-from nondum.host.sandbox.helper import HelperClient, drive_nodes, removals, requests
+from nondum.host.sandbox.helper import HelperClient, client, drive_nodes, removals, requests
 from nondum.host.sandbox.helper.client import PressesOfHelper
 from nondum.host.sandbox.helper.device_nodes import Nodes
 from nondum.host.sandbox.helper.disks import Disks
@@ -42,6 +42,7 @@ from nondum.sdk.wire import (
     Event,
     Reply,
     Request,
+    WireMessage,
     decode,
     encode,
 )
@@ -157,9 +158,16 @@ def raw(helper: Helper, *packets: bytes, fds: tuple[int, ...] = ()) -> str:
             asked.connect(str(helper.socket))
             for packet in packets:
                 socket.send_fds(asked, [packet], list(fds))
-            return code(decode(asked.recv(MAX_PACKET)))
+            return code(answered(asked))
 
     return served(ask)
+
+
+def answered(asked: socket.socket) -> WireMessage:
+    """What the helper answers, once it has begun; who is turned away is answered at once."""
+    said = decode(asked.recv(MAX_PACKET))
+    begun = Event(requests.HEARD, requests.CALL, {})
+    return decode(asked.recv(MAX_PACKET)) if said == begun else said
 
 
 def test_strangers_are_not_served(helper: Helper) -> None:
@@ -237,7 +245,7 @@ def test_flood_is_answered_or_turned_away(helper: Helper) -> None:
         for one in asked:
             try:
                 one.send(requests.encode(requests.ListCgroups()))
-                said.append(code(decode(one.recv(MAX_PACKET))))
+                said.append(code(answered(one)))
             except OSError:
                 said.append("hung up")
         return said
@@ -520,6 +528,33 @@ def test_helper_that_hangs_up_is_told(tmp_path: Path) -> None:
         with pytest.raises(NondumError) as silent:
             HelperClient(tmp_path / "s").ask(requests.ListCgroups())
         hanging_up.join()
+    assert silent.value.code == "HELPER_SILENT"
+
+
+@pytest.mark.parametrize("has_begun", [True, False])
+def test_helper_is_waited_for_until_it_has_begun_and_then_until_it_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_begun: bool
+) -> None:
+    """A machine that is slow to start it does not make it one that hangs."""
+    monkeypatch.setattr(client, "WAIT_S" if has_begun else "START_S", 0.01)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(str(tmp_path / "s"))
+        listening.listen()
+
+        def begin() -> None:
+            connection, _ = listening.accept()
+            with connection:
+                connection.recv(MAX_PACKET)
+                connection.send(encode(Event(requests.HEARD, requests.CALL, {})))
+                connection.recv(MAX_PACKET)
+
+        beginning = threading.Thread(target=begin)
+        if has_begun:
+            beginning.start()
+        with pytest.raises(NondumError) as silent:
+            HelperClient(tmp_path / "s").ask(requests.ListCgroups())
+        if has_begun:
+            beginning.join()
     assert silent.value.code == "HELPER_SILENT"
 
 

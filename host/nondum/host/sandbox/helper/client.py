@@ -25,8 +25,11 @@ SOCKET = Path("/run/nondum-helper/helper.sock")
 MOUNTS = Path("/run/nondum-helper/mounts")
 DEVICES = Path("/run/nondum-helper/devices")
 """Below it, component by component, are the nodes that the helper makes."""
+START_S = 45.0
+"""For the helper to begin: systemd starts it for the first question, on a slow machine that has
+other things to do. With what follows it is less than a job process is waited for."""
 WAIT_S = 15.0
-"""Longer than the helper waits for a drive."""
+"""From then on: longer than the helper waits for a drive."""
 PAUSE_S = 0.02
 
 log = logging.getLogger(__name__)
@@ -100,7 +103,6 @@ class HelperClient:
         """Listen to the key that the helper's own configuration names."""
         asked = _opened()
         try:
-            asked.settimeout(WAIT_S)
             said = self._asked(asked, requests.ListenToStopKey())
             asked.settimeout(0)
             match said:
@@ -125,22 +127,23 @@ class HelperClient:
 
     def _ask(self, request: Request, *descriptors: int) -> dict[str, Any]:
         with _opened() as asked:
-            asked.settimeout(WAIT_S)
             return _result(self._asked(asked, request, *descriptors))
 
     def _asked(self, asked: socket.socket, request: Request, *descriptors: int) -> WireMessage:
         """Ask over a socket; what comes first."""
         try:
+            asked.settimeout(START_S)
             _connect(asked, self._path)
             # Who is turned away is answered before the question is heard.
             with contextlib.suppress(BrokenPipeError):
                 socket.send_fds(asked, [requests.encode(request)], descriptors)
-            answer = _received(asked)
+            said = _said(asked)
+            if isinstance(said, Event) and said.name == requests.HEARD:
+                asked.settimeout(WAIT_S)
+                said = _said(asked)
         except OSError as error:
             raise _silent(str(error)) from error
-        if not answer:
-            raise _silent("it hung up")
-        return decode(answer)
+        return said
 
 
 class PressesOfHelper:
@@ -251,6 +254,13 @@ def _connect(asked: socket.socket, path: Path) -> None:
             if time.monotonic() >= until_s:
                 raise
             time.sleep(PAUSE_S)
+
+
+def _said(asked: socket.socket) -> WireMessage:
+    """What comes next. Raises `InstallFailed` (HELPER_SILENT)."""
+    if data := _received(asked):
+        return decode(data)
+    raise _silent("it hung up")
 
 
 def _received(asked: socket.socket) -> bytes:

@@ -24,6 +24,8 @@ MAX_BYTES = 1024
 """Of a request."""
 CALL = 1
 """The number of the one request of a connection."""
+HEARD = "heard"
+"""The event that comes before an answer: the helper runs, and is at it."""
 LISTENING, PRESSED = "listening", "pressed"
 """Events that belong to `ListenToStopKey`."""
 

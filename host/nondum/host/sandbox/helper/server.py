@@ -17,7 +17,7 @@ from contextlib import closing
 
 from nondum.host.rpc import outcomes
 from nondum.host.sandbox.helper import removals, requests
-from nondum.host.sandbox.helper.requests import CALL, LISTENING, PRESSED, refused
+from nondum.host.sandbox.helper.requests import CALL, HEARD, LISTENING, PRESSED, refused
 from nondum.host.sandbox.helper.service import Service
 from nondum.host.sandbox.helper.stop_key import PressesOfDevice
 from nondum.sdk.errors import InstallFailed, NondumError, Problem
@@ -105,6 +105,7 @@ class Server:
     def _answer(self, connection: socket.socket) -> None:
         self._listening.close()
         connection.settimeout(QUESTION_S)
+        _tell(connection, HEARD, {})
         _say(connection, answer(connection, self._service))
 
     def _reap(self) -> None:
