@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
 
-from nondum.host.catalogue import backups
+from nondum.host.catalogue import backups, database
 from nondum.host.catalogue.backups import Backups
 from nondum.host.catalogue.catalogue import Catalogue
+from nondum.host.catalogue.opening import Instead
 from nondum.host.catalogue.reserve import RESERVE_BYTES, Reserve
-from nondum.host.core.state import HostState
+from nondum.host.core.state import Highwater, HostState
+from nondum.sdk.errors import ConfigRefused
 
 pytestmark = pytest.mark.anyio
 
@@ -91,3 +94,76 @@ async def test_reserve_takes_disk_space_and_gives_it_back(tmp_path: Path) -> Non
     assert reserve.release()
     assert not reserve.path.exists()
     assert not reserve.release()
+
+
+NEXT = database.SCHEMA + 1
+
+
+@contextmanager
+def newer_nondum() -> Iterator[None]:
+    """What the next version does to a catalogue."""
+    with pytest.MonkeyPatch.context() as patched:
+        change = "ALTER TABLE drives ADD COLUMN colour TEXT NOT NULL DEFAULT '';"
+        patched.setattr(database, "_UPGRADES", {database.SCHEMA: change})
+        patched.setattr(database, "SCHEMA", NEXT)
+        yield
+
+
+def knowing(revision: int, **releases: int) -> HostState:
+    highwater = {name: Highwater(number, f"{number:064}") for name, number in releases.items()}
+    return HostState("spot", revision, highwater=highwater)
+
+
+async def written(path: Path, state: HostState) -> None:
+    catalogue = await Catalogue.open(path / "catalogue.sqlite", "spot")
+    await catalogue.commit(state, ())
+    await catalogue.close()
+
+
+async def test_older_nondum_continues_where_it_was_but_knows_the_newest_releases(
+    tmp_path: Path,
+) -> None:
+    await written(tmp_path, knowing(3, lamp=1, torch=5))
+    with newer_nondum():
+        await written(tmp_path, knowing(9, lamp=4, torch=5, eye=1))
+    for is_told in (True, False):  # once
+        catalogue = await Catalogue.open(tmp_path / "catalogue.sqlite", "spot")
+        await catalogue.close()
+        assert catalogue.state == knowing(3, lamp=4, torch=5, eye=1)
+        assert (catalogue.loss is not None) is is_told
+        if catalogue.loss is not None:
+            assert catalogue.loss.instead is Instead.FORMER
+            assert catalogue.loss.aside is not None and catalogue.loss.aside.exists()
+    with newer_nondum():
+        await written(tmp_path, knowing(4))
+
+
+@pytest.mark.parametrize("harm", ["no copy", "copy damaged", "releases unreadable"])
+async def test_older_nondum_leaves_alone_what_it_cannot_go_back_from(
+    tmp_path: Path, harm: str
+) -> None:
+    await written(tmp_path, knowing(3, lamp=1))
+    with newer_nondum():
+        await written(tmp_path, knowing(9, lamp=4))
+    copy = Backups(tmp_path / "catalogue.sqlite").of_schema(database.SCHEMA)
+    match harm:
+        case "no copy":
+            copy.unlink()
+        case "copy damaged":
+            copy.write_bytes(b"\0" * 10_000)
+        case _:
+            with closing(sqlite3.connect(tmp_path / "catalogue.sqlite")) as connection:
+                connection.execute("ALTER TABLE highwater RENAME COLUMN release TO newest")
+    with pytest.raises(ConfigRefused) as refused:
+        await Catalogue.open(tmp_path / "catalogue.sqlite", "spot")
+    assert refused.value.code == "CATALOGUE_VERSION"
+    assert revision(tmp_path / "catalogue.sqlite") == 9
+
+
+async def test_only_the_copy_of_the_last_upgrade_is_kept(tmp_path: Path) -> None:
+    kept = Backups(tmp_path / "catalogue.sqlite")
+    await written(tmp_path, knowing(3))
+    kept.make_of_schema(database.SCHEMA - 1)
+    with newer_nondum():
+        await written(tmp_path, knowing(4))
+    assert {path.name for path in kept.folder.iterdir()} == {kept.of_schema(database.SCHEMA).name}

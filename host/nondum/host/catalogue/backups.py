@@ -1,4 +1,5 @@
-"""Copies of the catalogue, for the day on which its file is damaged: the last two are kept.
+"""Copies of the catalogue, for the day on which its file is damaged: the last two are kept; and one
+from before an upgrade of nondum, for the day on which that is undone.
 
 SQLite's own backup makes them (sqlite.org/backup.html), from a connection that only reads, so that
 no commit waits. Blocking, but for `keep`.
@@ -20,6 +21,7 @@ from nondum.wheelhouse.store import disk
 
 FOLDER = "backups"
 """Beside the catalogue."""
+OF_SCHEMA = "of-schema-"
 SETTLED_S = 5.0
 """What changes in so short a time goes into one backup."""
 
@@ -47,24 +49,44 @@ class Backups:
         """The one before that."""
         return self.folder / "before.sqlite"
 
+    def of_schema(self, schema: int) -> Path:
+        """The one from before the upgrade that ended the use of a schema."""
+        return self.folder / f"{OF_SCHEMA}{schema}.sqlite"
+
     def make(self) -> None:
         """Copy the catalogue as it was last committed. Killed at any moment, at least one whole
         copy stays. Raises `sqlite3.Error`, `OSError`."""
+        unfinished = self._copied()
+        if self.newest.exists():
+            self.newest.rename(self.before)
+        unfinished.rename(self.newest)
+        disk.sync(self.folder)
+
+    def make_of_schema(self, schema: int) -> None:
+        """Copy the catalogue before it is brought to another schema; copies of older ones go. If
+        that fails, the upgrade takes place all the same."""
+        try:
+            self._copied().rename(self.of_schema(schema))
+            for former in self.folder.glob(f"{OF_SCHEMA}*"):
+                if former != self.of_schema(schema):
+                    former.unlink()
+            disk.sync(self.folder)
+        except (sqlite3.Error, OSError) as error:
+            log.warning("the catalogue of schema %d is not kept: %s", schema, error)
+
+    def _copied(self) -> Path:
         disk.make_folder(self.folder)
         unfinished = self.folder / ".newest.part"
         unfinished.unlink(missing_ok=True)
         with _reading(self.catalogue, "mode=ro") as source, _writing(unfinished) as target:
             source.backup(target)
         disk.sync(unfinished)
-        if self.newest.exists():
-            self.newest.rename(self.before)
-        unfinished.rename(self.newest)
-        disk.sync(self.folder)
+        return unfinished
 
     def found(self) -> Iterator[Path]:
         """Those that are there and whole, the newest first."""
         for path in (self.newest, self.before):
-            if path.exists() and _is_whole(path):
+            if path.exists() and is_whole(path):
                 yield path
 
     def restore(self, backup: Path) -> None:
@@ -108,7 +130,8 @@ def _writing(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
 
 
-def _is_whole(path: Path) -> bool:
+def is_whole(path: Path) -> bool:
+    """Whether a copy can be used."""
     try:
         # Immutable: nothing writes to it, and SQLite makes no log beside it.
         with _reading(path, "immutable=1") as connection:

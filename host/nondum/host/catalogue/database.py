@@ -18,7 +18,7 @@ from nondum.host.catalogue import journal, rows
 from nondum.host.core.records.component import ComponentRecord
 from nondum.host.core.records.journal import JournalEntry
 from nondum.host.core.records.payload import Rollback
-from nondum.host.core.state import HostState
+from nondum.host.core.state import Highwater, HostState
 from nondum.sdk.errors import ConfigRefused, NondumError, Problem
 
 SCHEMA = 8
@@ -96,8 +96,11 @@ MODE = 0o600
 """Of the file: it holds the journal, goals and serial numbers, for no other user to read."""
 
 
-def connect(path: Path) -> sqlite3.Connection:
-    """Open the file, made if it is not there.
+def connect(
+    path: Path, before_upgrade: Callable[[int], None] = lambda schema: None
+) -> sqlite3.Connection:
+    """Open the file, made if it is not there. One of an older schema is brought to this one; before
+    that, `before_upgrade` is called with its own.
 
     Raises `sqlite3.DatabaseError` (see `is_damaged`) and `ConfigRefused` (CATALOGUE_VERSION).
     """
@@ -112,21 +115,28 @@ def connect(path: Path) -> sqlite3.Connection:
         (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
             raise damaged(verdict)
-        _prepare(connection)
+        _prepare(connection, before_upgrade)
     except BaseException:
         connection.close()
         raise
     return connection
 
 
-def opened(path: Path, host: str) -> tuple[sqlite3.Connection, HostState]:
-    """Open the file and read all of it but the journal.
+def opened(
+    path: Path,
+    host: str,
+    before_upgrade: Callable[[int], None] = lambda schema: None,
+    newest: Mapping[str, Highwater] | None = None,
+) -> tuple[sqlite3.Connection, HostState]:
+    """Open the file and read all of it but the journal. Releases of payloads in `newest` that are
+    newer than what it knows are written into it first.
 
     Raises `sqlite3.DatabaseError` (`is_damaged` is true for it also if a row cannot be parsed) and
     `ConfigRefused` (CATALOGUE_VERSION).
     """
-    connection = connect(path)
+    connection = connect(path, before_upgrade)
     try:
+        _raise_highwater(connection, newest or {})
         return connection, load(connection, host)
     except BaseException as error:
         connection.close()
@@ -166,8 +176,32 @@ def damaged(verdict: str) -> sqlite3.DatabaseError:
     return error
 
 
-def _prepare(connection: sqlite3.Connection) -> None:
+def newest_releases(path: Path) -> dict[str, Highwater] | None:
+    """Payload → its newest release, as a file of any schema has it; None: it cannot be read."""
+    try:
+        with contextlib.closing(sqlite3.connect(path)) as connection:
+            connection.row_factory = sqlite3.Row
+            found = connection.execute("SELECT * FROM highwater").fetchall()
+            return {row["payload_id"]: rows.highwater(row) for row in found}
+    except _UNREADABLE:
+        return None
+
+
+def _raise_highwater(connection: sqlite3.Connection, newest: Mapping[str, Highwater]) -> None:
+    known = {
+        row["payload_id"]: rows.highwater(row)
+        for row in connection.execute("SELECT * FROM highwater")
+    }
+    for payload_id, one in newest.items():
+        if payload_id not in known or known[payload_id].release < one.release:
+            row = {"payload_id": payload_id, **rows.highwater_row(one)}
+            _insert(connection, "highwater", row)
+
+
+def _prepare(connection: sqlite3.Connection, before_upgrade: Callable[[int], None]) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version in _UPGRADES:
+        before_upgrade(version)
     while version in _UPGRADES:
         _run_script(connection, _UPGRADES[version], version + 1)
         version += 1

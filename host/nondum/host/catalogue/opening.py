@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import sqlite3
 import time
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 
 from nondum.host.catalogue import database
-from nondum.host.catalogue.backups import Backups
-from nondum.host.core.state import HostState
+from nondum.host.catalogue.backups import Backups, is_whole
+from nondum.host.core.state import Highwater, HostState
 from nondum.sdk.errors import ConfigRefused, Problem
 from nondum.sdk.frozen import frozen
 from nondum.wheelhouse.store import disk
@@ -24,6 +25,8 @@ class Instead(Enum):
 
     BACKUP = "backup"
     """A copy of it."""
+    FORMER = "former"
+    """A copy from before a newer nondum took it over."""
     MEMORY = "memory"
     """What the running daemon knew."""
     NOTHING = "nothing"
@@ -52,7 +55,8 @@ class Opened:
 
 def open_file(path: Path, host: str) -> Opened:
     """Open the file, made if there is none. A damaged one is set aside; the last whole backup, or
-    else an empty one, takes its place. So it is for one that is gone where a host has lived.
+    else an empty one, takes its place. So it is for one that is gone where a host has lived. In the
+    place of one that a newer nondum has taken over, there is the copy from before that.
 
     Raises `ConfigRefused` (CATALOGUE_VERSION, STATE_UNWRITABLE).
     """
@@ -60,7 +64,7 @@ def open_file(path: Path, host: str) -> Opened:
     try:
         disk.make_folder(path.parent)
         if path.exists() or not _was_there(path, backups):
-            opened = _opened(path, host)
+            opened = _found(path, host, backups)
             if opened is not None:
                 return opened
         return _instead(path, host, backups)
@@ -68,9 +72,9 @@ def open_file(path: Path, host: str) -> Opened:
         raise ConfigRefused(_unwritable(path, error)) from error
 
 
-def set_aside(path: Path) -> Path | None:
+def set_aside(path: Path, why: str = "damaged") -> Path | None:
     """Move a file that is of no use out of the way, with its log; where to, if it is there."""
-    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
+    aside = path.with_name(f"{path.name}.{why}-{time.time_ns()}")
     moved = False
     for suffix in ("", "-wal", "-shm"):
         with contextlib.suppress(FileNotFoundError):
@@ -86,10 +90,22 @@ def _was_there(path: Path, backups: Backups) -> bool:
     return any(backups.found()) or any(one.is_dir() and any(one.iterdir()) for one in beside)
 
 
-def _opened(path: Path, host: str) -> Opened | None:
+def _found(path: Path, host: str, backups: Backups) -> Opened | None:
+    try:
+        return _opened(path, host, backups)
+    except ConfigRefused as refused:
+        return _former(path, host, backups, refused)
+
+
+def _opened(
+    path: Path,
+    host: str,
+    backups: Backups,
+    newest: Mapping[str, Highwater] | None = None,
+) -> Opened | None:
     """The file as it is; None: it is damaged, or its content cannot be decoded."""
     try:
-        return Opened(*database.opened(path, host))
+        return Opened(*database.opened(path, host, backups.make_of_schema, newest))
     except sqlite3.DatabaseError as error:
         if not database.is_damaged(error):
             raise
@@ -100,7 +116,7 @@ def _instead(path: Path, host: str, backups: Backups) -> Opened:
     aside = set_aside(path)
     for backup in backups.found():
         backups.restore(backup)
-        opened = _opened(path, host)
+        opened = _opened(path, host, backups)
         if opened is not None:
             loss = Loss(aside, Instead.BACKUP, opened.state.revision)
             return Opened(opened.connection, opened.state, loss)
@@ -108,9 +124,29 @@ def _instead(path: Path, host: str, backups: Backups) -> Opened:
     return Opened(database.connect(path), HostState(host), Loss(aside, Instead.NOTHING))
 
 
+def _former(path: Path, host: str, backups: Backups, refused: ConfigRefused) -> Opened:
+    """The copy of this schema, which knows the newest releases all the same: what was withdrawn or
+    replaced under the newer nondum does not come back with the older one.
+
+    Raises `refused` if there is no such copy, or those cannot be read.
+    """
+    backup, newest = backups.of_schema(database.SCHEMA), database.newest_releases(path)
+    if newest is None or not (backup.exists() and is_whole(backup)):
+        raise refused
+    aside = set_aside(path, "newer")
+    backups.restore(backup)
+    opened = _opened(path, host, backups, newest)
+    if opened is None:
+        raise refused
+    loss = Loss(aside, Instead.FORMER, opened.state.revision)
+    return Opened(opened.connection, opened.state, loss)
+
+
 def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
     """What is told of a loss; `installed` are the payloads that were found in their folders."""
     came = "is gone" if loss.aside is None else "was damaged"
+    if loss.instead is Instead.FORMER:
+        came = "is a newer nondum's"
     instead = _INSTEAD[loss.instead].format(loss.revision)
     found = f"; found again: {', '.join(installed)}" if installed else ""
     return Problem(
@@ -124,11 +160,15 @@ def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
 
 _INSTEAD = {
     Instead.BACKUP: "a copy of revision {} took its place, and drives are read again",
+    Instead.FORMER: "the copy of before the upgrade (revision {}) took its place, and drives are "
+    "read again",
     Instead.MEMORY: "what the running daemon knew (revision {}) was written to a new one",
     Instead.NOTHING: "there was no copy of it, so a new one was begun, and drives are read again",
 }
 _LOST = {
     Instead.BACKUP: "lost: what was told, set and asked for since the copy was made",
+    Instead.FORMER: "lost: what was told, set and asked for since the upgrade; releases and trust "
+    "are those of today",
     Instead.MEMORY: "lost: the journal until now",
     Instead.NOTHING: "lost: the journal, goals, mounts that people set, releases of payloads that "
     "are not here",
