@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import shutil
+import sqlite3
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -243,3 +245,25 @@ async def test_files_that_were_taken_away_are_told(tmp_path: Path) -> None:
         await uninstall(TORCH_ID, host.catalogue, host.bus)
         await install(installed, host.catalogue, host.bus)
         await host.until_step(TORCH_ID, Step.ACTIVE)
+
+
+@pytest.mark.parametrize("has_wheels", [True, False], ids=["wheels for all", "wheels for one"])
+async def test_another_python_has_what_was_made_for_the_one_before_made_again(
+    tmp_path: Path, has_wheels: bool
+) -> None:
+    """A guest is read again from its drive where the store has no wheels for this Python."""
+    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
+    sound(tmp_path / "drive")
+    async with host_in_process(tmp_path) as host:
+        await install(installed, host.catalogue, host.bus)
+        host.plug(tmp_path / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+    with contextlib.closing(sqlite3.connect(host.folders.catalogue)) as catalogue, catalogue:
+        other = "replace(site_packages, '/lib/python3.', '/lib/python2.')"
+        catalogue.execute(f"UPDATE components SET site_packages = {other}")
+    if not has_wheels:
+        shutil.rmtree(host.folders.store)
+    async with host_in_process(tmp_path) as host:
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        record = await host.until_step(TORCH_ID, Step.ACTIVE if has_wheels else Step.QUARANTINED)
+        assert [p.code for p in record.problems] == ([] if has_wheels else ["PAYLOAD_LOST"])

@@ -14,7 +14,7 @@ from nondum.host.jobs.installed_component import InstalledComponent
 from nondum.host.jobs.table import Arguments, Report
 from nondum.host.trust import chain
 from nondum.sdk.codec.values import to_plain
-from nondum.sdk.errors import InstallFailed, Problem
+from nondum.sdk.errors import InstallFailed, PayloadRefused, Problem
 from nondum.wheelhouse.build import source
 from nondum.wheelhouse.format.data import BroughtData
 from nondum.wheelhouse.format.lock import LockedWheel
@@ -128,19 +128,39 @@ def _sync(folder: Path, *, with_wheels: bool) -> None:
     disk.sync(folder.parent)
 
 
-def stored_names(wheels: dict[str, tuple[LockedWheel, ...]]) -> set[str]:
-    """Hashes of all wheels that components are made of."""
-    return {locked.sha256 for group in wheels.values() for locked in group}
-
-
 def in_use(arguments: Arguments, report: Report) -> dict[str, set[str]]:
     """Payload key → hashes of the wheels and data that it needs, of the payload folders given."""
     facts = look.facts_of(arguments)
     staged = [look.load_staged(Path(f)) for f in arguments["folders"] if Path(f).exists()]
     return {
-        one.folder.name: stored_names(one.wheels(facts)) | {d.sha256 for d in one.data_files}
+        one.folder.name: {w.sha256 for w in _wheels_for(one, facts) or ()}
+        | {d.sha256 for d in one.data_files}
         for one in staged
     }
+
+
+def without_wheels(arguments: Arguments, report: Report) -> list[str]:
+    """Keys of those of the payload folders given whose wheels for this host are not all here: they
+    were copied for another Python."""
+    facts = look.facts_of(arguments)
+    staged = (look.load_staged(Path(f)) for f in arguments["folders"])
+    return [one.folder.name for one in staged if _lacks(arguments, one, facts)]
+
+
+def _lacks(arguments: Arguments, staged: StagedPayload, facts: HostFacts) -> bool:
+    wheels = _wheels_for(staged, facts)
+    if wheels is None:
+        return True
+    known = look.known_wheels(arguments, staged, facts)
+    return any(w.sha256 not in known and not (staged.folder / w.path).exists() for w in wheels)
+
+
+def _wheels_for(staged: StagedPayload, facts: HostFacts) -> tuple[LockedWheel, ...] | None:
+    """The wheels that this host needs; None: there are none for it."""
+    try:
+        return look.chosen(staged, facts)
+    except PayloadRefused:
+        return None
 
 
 def prune(arguments: Arguments, report: Report) -> list[str]:

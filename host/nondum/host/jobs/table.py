@@ -46,6 +46,7 @@ JOBS: Mapping[str, str] = {
     "prune": "nondum.host.jobs.install:prune",
     "listing": "nondum.host.jobs.install:listing",
     "sweep": "nondum.host.jobs.install:sweep",
+    "without_wheels": "nondum.host.jobs.install:without_wheels",
     "found": "nondum.host.jobs.noted:found",
     "trust_load": "nondum.host.trust.chain:load",
     "trust_extend": "nondum.host.trust.chain:extend",

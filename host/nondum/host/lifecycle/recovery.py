@@ -33,7 +33,7 @@ def recover(
 ) -> Outcome:
     """Send every payload forward or back. The sources report devices and drives again.
 
-    `missing` are keys of payloads whose folders are not there any more; `why` it is safe mode.
+    `missing` are keys of payloads whose files are not there any more; `why` it is safe mode.
     """
     turn = Turn(state, at)
     turn.change(devices={}, tries=crash_attribution.counted(state), is_stopped=False, safety=safety)
@@ -101,7 +101,7 @@ def _why_not(state: HostState, payload: PayloadRecord, *, is_missing: bool) -> P
 def _lost(payload: PayloadRecord) -> Problem:
     return Problem(
         "PAYLOAD_LOST",
-        "its files are gone from this host's state folder",
+        "its files, or its wheels for this host's Python, are gone from this host's state folder",
         where=payload.payload_id,
         fix=f"`nondum payload uninstall {payload.payload_id}`, then install it again",
     )

@@ -45,7 +45,14 @@ from nondum.host.manager.memory_reservations import MemoryReservations
 from nondum.host.manager.payload_cache import PayloadCache
 from nondum.host.manager.payload_trust import PayloadTrust
 from nondum.host.manager.shown_data import ShownData
-from nondum.host.manager.state_folders import Folders, missing, move, remove, sweep
+from nondum.host.manager.state_folders import (
+    Folders,
+    missing,
+    move,
+    of_another_python,
+    remove,
+    sweep,
+)
 from nondum.host.workers.leftovers import end_leftovers
 from nondum.host.workers.role import Role
 from nondum.host.workers.spec import base_interpreter
@@ -108,8 +115,14 @@ class Installation:
         return with_found(state, await self._children.run("found", arguments), at)
 
     async def missing(self, state: HostState) -> frozenset[str]:
-        """Payloads of the state whose files are gone."""
-        return await in_thread(missing, self._folders, state)
+        """Payloads of the state whose files are gone, or that have none for this Python."""
+        gone = await in_thread(missing, self._folders, state)
+        if not (others := of_another_python(state) - gone):
+            return gone
+        folders = [str(self._folders.payload(key)) for key in sorted(others)]
+        return gone.union(
+            await self._children.run("without_wheels", self._arguments(folders=folders))
+        )
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for. What cannot be is left."""

@@ -13,7 +13,7 @@ from nondum.host.core.transitions import KEEPS_FOLDER, KEEPS_VENVS
 from nondum.host.sandbox.helper import privileged
 from nondum.host.workers import scratch
 from nondum.sdk.frozen import frozen
-from nondum.wheelhouse.store import disk
+from nondum.wheelhouse.store import disk, venvs
 
 PRIVATE, PASSABLE = 0o700, 0o711
 PRIVATE_FILE = 0o600
@@ -222,6 +222,15 @@ def missing(folders: Folders, state: HostState) -> frozenset[str]:
         key
         for key, payload in state.payloads.items()
         if payload.step in KEEPS_FOLDER and not folders.payload(key).is_dir()
+    )
+
+
+def of_another_python(state: HostState) -> frozenset[str]:
+    """Keys of payloads whose venvs were made by a Python that this one is not."""
+    return frozenset(
+        component.payload
+        for component in state.components.values()
+        if component.site_packages != venvs.site_packages(component.venv)
     )
 
 

@@ -16,7 +16,8 @@ CODES = (
     ),
     Code(
         "CATALOGUE_REBUILT",
-        "The catalogue was damaged, and was made again from its last copy and from what is stored.",
+        "The catalogue was damaged, or a newer nondum's, and was made again from a copy and from "
+        "what is stored.",
         "see `nondum status`: install, set or ask for again what is not there",
     ),
     Code(

@@ -77,7 +77,8 @@ CODES = (
     ),
     Code(
         "PAYLOAD_LOST",
-        "The files of an installed payload are gone from the host's state folder.",
+        "The files of an installed payload, or its wheels for the host's Python, are gone from the "
+        "host's state folder.",
         "`nondum payload uninstall` it, then install it again",
     ),
     Code(
