@@ -16,7 +16,7 @@ from tests.campaign.progress import Limit, Round, work_off
 from tests.kit.payloads import sdk_wheel
 from tests.lab.building import built
 from tests.lab.lab import Lab
-from tests.lab.recipe import RECIPES, X86_64
+from tests.lab.recipe import ARCHITECTURES, PYTHONS, X86_64, recipe
 from tests.lab.scenario import SHORT, Result, Scenario, keep, run, scenarios
 from tests.lab.shell import talk
 from tests.lab.software import software
@@ -31,7 +31,7 @@ def main(words: Sequence[str]) -> int:
         print(*(f"{s.name:{width}}  {s.sentence}" for s in known.values()), sep="\n")
         return 0
     began = time.monotonic()
-    machine = built(RECIPES[asked.arch])
+    machine = built(recipe(asked.arch, asked.suite))
     _told("the machine is built", began)
     began = time.monotonic()
     disk = software(machine, asked.commit)
@@ -112,7 +112,10 @@ def _arguments(known: dict[str, Scenario], words: Sequence[str]) -> argparse.Nam
         "scenario", nargs="*", metavar="SCENARIO", help="which ones (all)", choices=[*known, []]
     )
     parser.add_argument(
-        "--arch", choices=RECIPES, default=X86_64.name, help="its processor (%(default)s)"
+        "--arch", choices=ARCHITECTURES, default=X86_64.name, help="its processor (%(default)s)"
+    )
+    parser.add_argument(
+        "--suite", choices=PYTHONS, default=X86_64.suite, help="its Debian (%(default)s)"
     )
     parser.add_argument("--payload", type=Path, metavar="DIR", help="what `payload` plugs in")
     parser.add_argument("--list", action="store_true", help="tell which scenarios there are")

@@ -23,7 +23,6 @@ from demo.scenario import Scenario
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
 from tests.lab.robot import MachineRobot
-from tests.lab.software import PYTHON
 
 RULES = "/etc/udev/rules.d/70-emulated-instruments.rules"
 ADAPTERS = {
@@ -36,7 +35,7 @@ ADAPTERS = {
 def kit(lab: Lab, names: Sequence[str], settings: Mapping[str, str]) -> Kit:
     """Build payloads for the lab's machines; `settings` are lines of plugins' settings, by name."""
     folders = {name: set_up(name, lab.work / "sources", text) for name, text in settings.items()}
-    target = Target((PYTHON,), (lab.built.recipe.name,))
+    target = Target((lab.built.recipe.python,), (lab.built.recipe.architecture,))
     return Kit.built(names, libraries=LIBRARIES, folders=folders, target=target)
 
 

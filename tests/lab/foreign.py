@@ -27,7 +27,7 @@ def see_it_run(recipe: Recipe) -> None:
     was_there = (FORMATS / "register").exists()
     if not was_there:
         call("mount", "-t", "binfmt_misc", "none", FORMATS)
-    call("update-binfmts", "--enable", f"qemu-{recipe.name}")
+    call("update-binfmts", "--enable", f"qemu-{recipe.architecture}")
     if not was_there:
         KEPT.mkdir(parents=True, exist_ok=True)
         call("mount", "-t", "binfmt_misc", "none", KEPT)

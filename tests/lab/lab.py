@@ -17,7 +17,7 @@ from tests.lab.fleet import Fleet
 from tests.lab.installed import NAME, Installed
 from tests.lab.machine import Machine
 from tests.lab.network import Lan
-from tests.lab.recipe import RECIPES
+from tests.lab.recipe import recipe
 from tests.lab.software import FOR_PAYLOADS, software
 
 
@@ -85,7 +85,7 @@ class Lab:
         self._lans.append(lan)
         machines = {}
         for name in names:
-            root, disk = self._made((of or {}).get(name, self.built.recipe.name))
+            root, disk = self._made((of or {}).get(name, self.built.recipe.architecture))
             machines[name] = self._machine(root, disk, memory_mb=memory_mb, socket=lan.socket())
         hosts = self._switched_on(machines)
         fleet = Fleet(self.work / f"fleet-{next(self._numbers)}")
@@ -98,9 +98,9 @@ class Lab:
 
     def _made(self, architecture: str) -> tuple[Built, Path]:
         """What a machine is started from, and the disk with nondum on it."""
-        if architecture == self.built.recipe.name:
+        if architecture == self.built.recipe.architecture:
             return self.built, self.software
-        other = built(RECIPES[architecture])
+        other = built(recipe(architecture, self.built.recipe.suite))
         return other, software(other, self.commit)
 
     def _machine(self, root: Built, *disks: Path, **options: Any) -> Machine:

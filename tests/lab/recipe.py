@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -33,6 +33,7 @@ class Recipe:
     """One kind of machine. Two recipes that are equal make the same machine."""
 
     name: str
+    """Its processor's, as `uname -m` says, and its system's unless that is Debian 12."""
     debian: str
     """Debian's name of the architecture."""
     kernel: str
@@ -53,6 +54,16 @@ class Recipe:
     """Size of its disk, most of it free."""
 
     @property
+    def architecture(self) -> str:
+        """As `uname -m` says."""
+        return MACHINES[self.debian]
+
+    @property
+    def python(self) -> str:
+        """The version of its Python: `3.11`."""
+        return PYTHONS[self.suite]
+
+    @property
     def key(self) -> str:
         """A hash of all that its root file system is made of."""
         parts = [json.dumps(self._of_root, sort_keys=True).encode()]
@@ -66,6 +77,9 @@ class Recipe:
         return {name: value for name, value in asdict(self).items() if name not in HOW_IT_IS_RUN}
 
 
+MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+PYTHONS = {"bookworm": "3.11", "trixie": "3.13"}
+"""Debian's releases 12 and 13, by the names of their suites."""
 HOW_IT_IS_RUN = frozenset({"program", "machine", "terminal", "slowness"})
 WITHOUT_AVX = "avx=off,avx2=off,f16c=off,fma=off"
 """QEMU emulates AVX value by value: by SSE (x86-64-v2, what numpy and OpenCV ask for at least) a
@@ -88,4 +102,12 @@ AARCH64 = Recipe(
     slowness=3.0,
 )
 """Stands for a Raspberry Pi 4 of 2 GB with its system: processor and memory, not its devices."""
-RECIPES = {recipe.name: recipe for recipe in (X86_64, AARCH64)}
+ARCHITECTURES = {recipe.architecture: recipe for recipe in (X86_64, AARCH64)}
+
+
+def recipe(architecture: str, suite: str = X86_64.suite) -> Recipe:
+    """The machine of a processor with a release of Debian."""
+    found = ARCHITECTURES[architecture]
+    if suite == found.suite:
+        return found
+    return replace(found, name=f"{architecture}-{suite}", suite=suite)

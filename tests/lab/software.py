@@ -41,8 +41,6 @@ LOCK = CHECKOUT / "packaging/development/requirements.lock"
 """Versions and hashes of all that others wrote."""
 PREFIX = "/opt/nondum"
 DISK_MB = 768
-PYTHON = "3.11"
-"""Debian 12's, as is its C library below."""
 PLATFORMS = (
     "manylinux_2_36",
     "manylinux_2_34",
@@ -50,6 +48,7 @@ PLATFORMS = (
     "manylinux_2_17",
     "manylinux2014",
 )
+"""What its C library takes: Debian 12's, or a newer one."""
 
 INSTALL = """
 set -eu
@@ -104,7 +103,7 @@ def _make(machine: Built, commit: str | None, folder: Path) -> None:
 def _compile(machine: Built, venv: Path) -> None:
     """Compile what was installed, on a disk that is read-only from now on. Where it is emulated,
     the machine's own Python takes ten times as long as one of the same version here."""
-    if f"{sys.version_info.major}.{sys.version_info.minor}" == PYTHON:
+    if f"{sys.version_info.major}.{sys.version_info.minor}" == machine.recipe.python:
         call("sh", "-c", COMPILE_HERE, "sh", venv, PREFIX, sys.executable)
     else:
         call("unshare", "--mount", "sh", "-c", COMPILE, "sh", venv, machine.root)
@@ -160,8 +159,8 @@ def _fetch(machine: Built, needs: list[str], folder: Path) -> None:
     lock.write_text(re.sub(r" ;[^\\\n]*", "", LOCK.read_text()))  # without markers: see _needs
     call(
         *(sys.executable, "-m", "pip", "download", "-q", "--only-binary", ":all:"),
-        *("--require-hashes", "-c", lock, "--python-version", PYTHON, "-d", folder),
-        *(f"--platform={name}_{machine.recipe.name}" for name in PLATFORMS),
+        *("--require-hashes", "-c", lock, "--python-version", machine.recipe.python, "-d", folder),
+        *(f"--platform={name}_{machine.recipe.architecture}" for name in PLATFORMS),
         *needs,
     )
 
@@ -169,7 +168,10 @@ def _fetch(machine: Built, needs: list[str], folder: Path) -> None:
 def _needs(machine: Built, wheel: Path) -> Iterator[str]:
     """What one of our own wheels needs of others' on that machine. (pip would ask the markers of
     what is needed there of the machine that it runs on.)"""
-    there = {"platform_machine": machine.recipe.name, "python_version": PYTHON}
+    there = {
+        "platform_machine": machine.recipe.architecture,
+        "python_version": machine.recipe.python,
+    }
     extras = EXTRAS.get(wheel.name.partition("-")[0], "")
     with zipfile.ZipFile(wheel) as archive:
         (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))

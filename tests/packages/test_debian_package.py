@@ -12,9 +12,12 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from tests.packages.checkout import copied
 from tests.packages.conftest import ROOT, Build, Package
 
@@ -34,6 +37,10 @@ both = pytest.mark.parametrize(
     "architecture",
     [pytest.param(name, marks=short if name == MINE else long) for name in MACHINES],
 )
+PYTHONS = ("3.11", "3.12", "3.13")
+every_python = pytest.mark.parametrize("python", PYTHONS)
+SHARED, SITE = "opt/nondum/lib/python3/site-packages", "opt/nondum/lib/python{}/site-packages"
+SYSTEM = Path("/usr/bin/python3")
 OF_DEBIAN = {
     **{"libc.so.6": "libc6", "libm.so.6": "libc6", "libdl.so.2": "libc6", "librt.so.1": "libc6"},
     **{"libpthread.so.0": "libc6", "ld-linux-x86-64.so.2": "libc6", "libutil.so.1": "libc6"},
@@ -88,14 +95,66 @@ def test_depends_on_the_libraries_that_wheels_leave_out(
 
 
 @both
-def test_own_distributions_and_planners_are_in_it(tree: Tree, architecture: str) -> None:
-    site = tree(architecture) / "opt/nondum/lib/python3.11/site-packages"
-    names = {folder.name.partition("-")[0] for folder in site.glob("*.dist-info")}
+@every_python
+def test_own_distributions_and_planners_are_in_it(
+    tree: Tree, architecture: str, python: str
+) -> None:
+    sites = _sites(tree(architecture), python)
+    names = {found.name.replace("-", "_") for found in distributions(path=sites)}
     assert {"nondum", "nondum_sdk", "nondum_planner_pyperplan", "pyperplan", "isal"} <= names
     assert {"nondum_host_lamps", "nondum_lab", "nondum_pddl_workbench"} <= names
     assert {"nondum_host_zenoh", "eclipse_zenoh"} <= names
-    assert not list(site.rglob("*.pyc")), "what is compiled is for the machine to make"
-    assert not (site / "bin").exists(), "others' programs are not ours to offer"
+    for site in map(Path, sites):
+        assert not list(site.rglob("*.pyc")), "what is compiled is for the machine to make"
+        assert not (site / "bin").exists(), "others' programs are not ours to offer"
+
+
+@both
+@every_python
+def test_each_python_finds_all_that_is_required(tree: Tree, architecture: str, python: str) -> None:
+    """Resolved by another Python than it is for, by pip, which asks markers of that one."""
+    version = {"python_version": python, "python_full_version": f"{python}.0"}
+    environment = {**version, "platform_machine": MACHINES[architecture], "extra": ""}
+    sites = _sites(tree(architecture), python)
+    found = {canonicalize_name(one.name): one for one in distributions(path=sites)}
+    for name, distribution in found.items():
+        for requirement in map(Requirement, distribution.requires or ()):
+            if requirement.marker is None or requirement.marker.evaluate(environment):
+                needed = found[canonicalize_name(requirement.name)]
+                assert requirement.specifier.contains(needed.version), (name, requirement)
+
+
+@both
+def test_what_all_pythons_have_alike_is_there_once(tree: Tree, architecture: str) -> None:
+    root = tree(architecture)
+    sites = (SHARED, *map(SITE.format, PYTHONS))
+    shared, *alone = ({entry.name for entry in (root / site).iterdir()} for site in sites)
+    assert {"nondum", "lark"} <= shared
+    assert not any(shared & names for names in alone)
+    assert all({"nondum.pth", "msgpack", "pyzmq.libs"} <= names for names in alone)
+
+
+@both
+@every_python
+def test_all_that_a_distribution_says_it_has_lies_together(
+    tree: Tree, architecture: str, python: str
+) -> None:
+    """Libraries of wheels find each other from where they lie."""
+    for site in _sites(tree(architecture), python):
+        for distribution in distributions(path=[site]):
+            for file in distribution.files or ():
+                assert Path(site, file).exists(), (distribution.name, file)
+
+
+@both
+def test_machine_code_of_a_python_is_for_that_one(tree: Tree, architecture: str) -> None:
+    names = {
+        python: {p.name for p in _files(tree(architecture) / SITE.format(python))}
+        for python in PYTHONS
+    }
+    for python, there in names.items():
+        tags = {name.split(".")[1] for name in there if ".cpython-" in name}
+        assert tags == {f"cpython-{python.replace('.', '')}-{MACHINES[architecture]}-linux-gnu"}
 
 
 @both
@@ -153,9 +212,12 @@ def test_all_that_is_compiled_at_installation_can_be(tree: Tree, architecture: s
 
 @short
 def test_command_of_the_tree_runs_wherever_it_lies(tree: Tree) -> None:
-    if MACHINES[MINE] != platform.machine() or not Path("/usr/bin/python3.11").exists():
-        pytest.skip("neither architecture is this machine's, or Debian 12's Python is not here")
+    """By whatever the machine calls python3: postinst makes the link that this test makes."""
+    system = SYSTEM.readlink().name if SYSTEM.is_symlink() else ""
+    if MACHINES[MINE] != platform.machine() or system not in [f"python{p}" for p in PYTHONS]:
+        pytest.skip("neither architecture is this machine's, or its Python is none of them")
     python = tree(MINE) / "opt/nondum/bin/python"
+    python.symlink_to(f"/usr/bin/{system}")
     command: list[str | Path] = [python, "-I", "-m", "nondum.cli"]
     said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
     assert "0.1.0" in said.stdout
@@ -180,6 +242,13 @@ def test_lintian_has_nothing_to_say(package: Package) -> None:
     command: list[str | Path] = ["lintian", "--fail-on", "error,warning", package("arm64")]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
+
+
+def _sites(root: Path, python: str) -> list[str]:
+    """Where that Python looks, as `site` says of what is in the tree."""
+    site = root / SITE.format(python)
+    leads_to = (site / "nondum.pth").read_text().strip()
+    return [str(site), str((site / leads_to).resolve())]
 
 
 def _field(deb: Path, name: str) -> str:

@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from nondum_deb import control, lock, places, tree
+from nondum_deb import control, lock, places, repository, tree
 from nondum_deb.architecture import ARCHITECTURES, Architecture, here
 from nondum_deb.command import BuildFailed, call
 from nondum_deb.places import CHECKOUT
@@ -39,6 +39,8 @@ def main(words: Sequence[str]) -> int:
             for architecture in wanted:
                 for package in build(architecture, versions, Path(own), asked.output):
                     print(package)
+        if asked.repository:
+            print(repository.write(asked.output, asked.repository))
     except BuildFailed as error:
         print(f"package: {error}", file=sys.stderr)
         return 1
@@ -116,6 +118,11 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
         "--version", action="append", type=_version, help="Debian's version, for builds of your own"
     )
     parser.add_argument("--output", "-o", type=Path, default=OUTPUT, help="folder (build/packages)")
+    parser.add_argument(
+        "--repository",
+        metavar="KEY",
+        help="make the folder one that apt reads, signed with this key of gpg's",
+    )
     parser.add_argument(
         "--lock", action="store_true", help="only fetch the newest of what it needs, and lock that"
     )

@@ -5,10 +5,8 @@ from __future__ import annotations
 import platform
 from dataclasses import dataclass
 
-from nondum_deb.places import PYTHON
-
 GLIBC = (36, 35, 34, 31, 28, 27, 26, 24, 17)
-"""Minor versions of glibc 2 that wheels may ask for: Debian 12 has 2.36."""
+"""Minor versions of glibc 2 that wheels may ask for: Debian 12 has 2.36, newer systems more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +23,12 @@ class Architecture:
         new = (f"manylinux_2_{minor}_{self.machine}" for minor in GLIBC)
         return (*new, f"manylinux2014_{self.machine}")
 
-    @property
-    def of_pip(self) -> tuple[str, ...]:
-        """How pip is told to deal in wheels for it, whatever this machine's architecture is."""
-        python = ("--python-version", PYTHON, "--implementation", "cp")
+    def of_pip(self, python: str) -> tuple[str, ...]:
+        """How pip is told to deal in wheels for it and for a Python (`3.12`), whatever this
+        machine's are."""
+        version = ("--python-version", python, "--implementation", "cp")
         platforms = (f"--platform={name}" for name in self.platforms)
-        return ("--only-binary=:all:", *python, *platforms)
+        return ("--only-binary=:all:", *version, *platforms)
 
 
 AMD64 = Architecture("amd64", "x86_64")

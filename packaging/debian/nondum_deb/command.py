@@ -15,11 +15,14 @@ class BuildFailed(Exception):
     """A package cannot be built; says why in words."""
 
 
-def call(*command: str | Path, env: Mapping[str, str] | None = None) -> str:
-    """Run a program; answers what it wrote. Raises `BuildFailed` with its last words."""
+def call(
+    *command: str | Path, env: Mapping[str, str] | None = None, folder: Path | None = None
+) -> str:
+    """Run a program, in a folder; answers what it wrote. Raises `BuildFailed` with its last
+    words."""
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=env
+            command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=env, cwd=folder
         )
     except FileNotFoundError as error:
         raise BuildFailed(f"{command[0]} is not there: see docs/install.md") from error

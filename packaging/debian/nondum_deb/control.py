@@ -9,12 +9,14 @@ from importlib.metadata import PathDistribution
 from pathlib import Path
 
 from nondum_deb.architecture import Architecture
-from nondum_deb.places import CHECKOUT, DEBIAN
-from nondum_deb.tree import DOCS, SITE, compress
+from nondum_deb.places import CHECKOUT, DEBIAN, PYTHONS
+from nondum_deb.tree import DOCS, SHARED, SITES, compress
 
+AFTER_THE_NEWEST = f"3.{int(PYTHONS[-1].removeprefix('3.')) + 1}"
 MAINTAINER = "The nondum project <nondum@example.org>"
 DEPENDS = (
-    *("python3 (>= 3.11~)", "python3 (<< 3.12)", "libc6 (>= 2.36)", "libgcc-s1", "libstdc++6"),
+    *(f"python3 (>= {PYTHONS[0]}~)", f"python3 (<< {AFTER_THE_NEWEST}~)"),
+    *("libc6 (>= 2.36)", "libgcc-s1", "libstdc++6"),
     "zlib1g",
     *("init-system-helpers (>= 1.54)", "systemd (>= 252)", "udev", "libudev1", "bubblewrap"),
 )
@@ -40,10 +42,11 @@ Description: rebuild a robot in the field: plug in a payload, and it plans with 
  domain, and reaches goals with what there is. Pulled payloads leave nothing.
  .
  The daemon runs as a service, as the user nondum. It comes with its own
- Python environment under /opt/nondum and needs no network.
+ Python environment under /opt/nondum, for each Python that it can be run by,
+ and needs no network.
 """
 CHANGELOG = """\
-nondum ({version}) bookworm; urgency=medium
+nondum ({version}) stable; urgency=medium
 
   * What is new is told in CHANGELOG.md.
 
@@ -72,6 +75,8 @@ License: {licence}
 Comment: its code lies beside that folder, which holds the text of the licence.
 """
 SCRIPTS = ("postinst", "prerm", "postrm")
+TRIGGERS = "interest-noawait /usr/bin/python3\n"
+"""What dpkg calls postinst for besides: the system has another Python (deb-triggers(5))."""
 
 
 def write(root: Path, version: str, architecture: Architecture, epoch: int) -> None:
@@ -94,6 +99,7 @@ def write(root: Path, version: str, architecture: Architecture, epoch: int) -> N
         suggests=", ".join(SUGGESTS),
     )
     (control / "control").write_text(text, encoding="utf-8")
+    (control / "triggers").write_text(TRIGGERS, encoding="utf-8")
     for name in SCRIPTS:
         (control / name).write_bytes((DEBIAN / "scripts" / name).read_bytes())
         (control / name).chmod(0o755)
@@ -105,12 +111,14 @@ def _documents(root: Path, version: str, epoch: int) -> None:
     text = CHANGELOG.format(version=version, maintainer=MAINTAINER, date=date)
     compress(text, folder / "changelog.gz")
     compress((CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8"), folder / "CHANGELOG.md.gz")
-    (folder / "copyright").write_text(_copyright(root / SITE, epoch), encoding="utf-8")
+    (folder / "copyright").write_text(_copyright(root, epoch), encoding="utf-8")
 
 
-def _copyright(site: Path, epoch: int) -> str:
+def _copyright(root: Path, epoch: int) -> str:
     others = []
-    for folder in sorted(site.glob("*.dist-info")):
+    sites = (root / site for site in (SHARED, *SITES.values()))
+    folders = {folder.name: folder for site in sites for folder in site.glob("*.dist-info")}
+    for _, folder in sorted(folders.items()):
         told = PathDistribution(folder).metadata
         given = (told[key] for key in ("License-Expression", "License") if key in told)
         licence = next(filter(None, given), "see its folder")

@@ -1,5 +1,5 @@
 """Other people's wheels that go into the packages, and those that build nondum's own: versions and
-hashes, of all architectures.
+hashes, of all architectures and Pythons.
 
 Files in the words of pip (`--require-hashes`), so that it is pip who holds what it fetches to them.
 """
@@ -7,17 +7,18 @@ Files in the words of pip (`--require-hashes`), so that it is pip who holds what
 from __future__ import annotations
 
 import hashlib
+import itertools
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from nondum_deb.architecture import ARCHITECTURES, Architecture
 from nondum_deb.command import PIP, call
-from nondum_deb.places import BACKEND_LOCK, LOCK, declared, declared_backend
+from nondum_deb.places import BACKEND_LOCK, LOCK, PYTHONS, declared, declared_backend
 
 HEAD = """\
 # What is in the Debian packages besides nondum: exact versions, with the hashes of the wheels of
-# every architecture. Written by `./run package --lock`.
+# every architecture and Python. Written by `./run package --lock`.
 """
 BACKEND_HEAD = """\
 # What builds nondum's own wheels for the packages: exact versions, with hashes. Written by
@@ -25,14 +26,14 @@ BACKEND_HEAD = """\
 """
 
 
-def download(architecture: Architecture, folder: Path, *what: str) -> None:
-    """Fetch wheels that run on an architecture, whatever this machine's is."""
-    call(*PIP, "download", "-d", folder, *architecture.of_pip, *what)
+def download(architecture: Architecture, python: str, folder: Path, *what: str) -> None:
+    """Fetch wheels that run on an architecture and a Python, whatever this machine's are."""
+    call(*PIP, "download", "-d", folder, *architecture.of_pip(python), *what)
 
 
-def locked_wheels(architecture: Architecture, folder: Path) -> None:
+def locked_wheels(architecture: Architecture, python: str, folder: Path) -> None:
     """Fetch what the lock names. Raises `BuildFailed` where a hash is not one of its."""
-    download(architecture, folder, "--no-deps", "--require-hashes", "-r", str(LOCK))
+    download(architecture, python, folder, "--no-deps", "--require-hashes", "-r", str(LOCK))
 
 
 def install_backend(folder: Path) -> None:
@@ -49,11 +50,14 @@ def write(path: Path = LOCK, backend: Path = BACKEND_LOCK) -> None:
 
 
 def _newest(wanted: Sequence[str]) -> list[str]:
+    """Chosen for the oldest Python: every other one gets the same versions."""
     wheels: list[tuple[str, str, str]] = []
     with tempfile.TemporaryDirectory(prefix="nondum-lock-") as scratch:
-        for architecture in ARCHITECTURES.values():
-            folder = Path(scratch, architecture.debian)
-            download(architecture, folder, *wanted)
+        for python, architecture in itertools.product(PYTHONS, ARCHITECTURES.values()):
+            folder = Path(scratch, python, architecture.debian)
+            pinned = sorted({f"{name}=={version}" for name, version, _ in wheels})
+            held = ("--no-deps", *pinned) if pinned else wanted
+            download(architecture, python, folder, *held)
             wheels += map(_entry, folder.glob("*.whl"))
     return _lines(wheels)
 

@@ -19,8 +19,8 @@ DISTRIBUTIONS = (
 of every package: it is under the GPL."""
 EXTRAS = {"nondum": ("fast", "usb")}
 """Of those, the optional parts that are always installed with them."""
-PYTHON = "3.11"
-"""Debian 12's."""
+PYTHONS = ("3.11", "3.12", "3.13")
+"""Those that the package has libraries for: Debian 12's, Ubuntu 24.04's and Debian 13's."""
 
 
 def project(distribution: str) -> dict[str, object]:

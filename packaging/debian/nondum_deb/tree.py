@@ -1,30 +1,37 @@
 """What the package puts on a machine: a venv under /opt/nondum, units, configuration, completion.
 
 The venv is made without running anything of its architecture: `pip install --target` unpacks wheels
-for any, and a venv is little else than a link to Python and a file beside it (PEP 405).
+for any, and a venv is little else than a link to Python and a file beside it (PEP 405). It serves
+several Pythons: what is the same for all lies in a folder that each one's own leads to by a file of
+`site`; the link to the machine's Python is made where the package is configured.
 """
 
 from __future__ import annotations
 
+import csv
 import gzip
 import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from nondum_deb import lock
 from nondum_deb.architecture import Architecture
 from nondum_deb.command import PIP, BuildFailed, call
-from nondum_deb.places import CHECKOUT, DEBIAN, DISTRIBUTIONS, EXTRAS, PACKAGING, PYTHON, project
+from nondum_deb.places import CHECKOUT, DEBIAN, DISTRIBUTIONS, EXTRAS, PACKAGING, PYTHONS, project
 
 PREFIX = "opt/nondum"
-SITE = f"{PREFIX}/lib/python{PYTHON}/site-packages"
-PYVENV = f"""\
+SHARED = f"{PREFIX}/lib/python3/site-packages"
+"""What every Python has alike."""
+SITES = {python: f"{PREFIX}/lib/python{python}/site-packages" for python in PYTHONS}
+"""Where each Python begins to look."""
+LEADS_TO_SHARED = "../../python3/site-packages\n"
+"""A line of a `.pth` file is a folder, from where that file lies (docs.python.org, `site`)."""
+PYVENV = """\
 home = /usr/bin
 include-system-site-packages = false
-version = {PYTHON}
-executable = /usr/bin/python{PYTHON}
 """
 LAUNCHER = """\
 #!/opt/nondum/bin/python -I
@@ -58,7 +65,7 @@ COMPLETIONS = {
 def make(root: Path, architecture: Architecture, own: Path) -> None:
     """Fill an empty folder with all files of the package but those of dpkg. `own` holds the wheels
     that `own_wheels` made."""
-    _site_packages(root / SITE, architecture, own)
+    _libraries(root, architecture, own)
     _venv(root)
     _machine_files(root)
     _completions(root)
@@ -83,17 +90,53 @@ def compress(text: str, path: Path) -> None:
     path.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
 
 
-def _site_packages(site: Path, architecture: Architecture, own: Path) -> None:
-    with tempfile.TemporaryDirectory(prefix="nondum-wheels-") as others:
-        lock.locked_wheels(architecture, Path(others))
-        _unpack(site, architecture, own, Path(others))
-    _without_programs(site)
+def _libraries(root: Path, architecture: Architecture, own: Path) -> None:
+    for python, site in SITES.items():
+        with tempfile.TemporaryDirectory(prefix="nondum-wheels-") as others:
+            lock.locked_wheels(architecture, python, Path(others))
+            _unpack(root / site, architecture, python, own, Path(others))
+        _without_programs(root / site)
+    _share(root / SHARED, [root / site for site in SITES.values()])
 
 
-def _unpack(site: Path, architecture: Architecture, *wheels: Path) -> None:
+def _share(shared: Path, sites: Sequence[Path]) -> None:
+    """Have those distributions once that are the same in all folders: whole ones, since libraries
+    find each other from where they lie."""
+    first, *others = sites
+    for record in sorted(first.glob("*.dist-info/RECORD")):
+        name = record.relative_to(first)
+        if all(_is_same(record, other / name) for other in others):
+            for path in _recorded(record):
+                (shared / path).parent.mkdir(parents=True, exist_ok=True)
+                (first / path).rename(shared / path)
+                for other in others:
+                    (other / path).unlink()
+    for site in sites:
+        _delete_empty(site)
+        _write(site / "nondum.pth", LEADS_TO_SHARED)
+
+
+def _is_same(record: Path, other: Path) -> bool:
+    """Whether two RECORDs tell of the same files: they have the hash of each."""
+    return other.exists() and record.read_bytes() == other.read_bytes()
+
+
+def _recorded(record: Path) -> list[str]:
+    with record.open(encoding="utf-8", newline="") as rows:
+        return [row[0] for row in csv.reader(rows)]
+
+
+def _delete_empty(site: Path) -> None:
+    folders = [path for path in site.rglob("*") if path.is_dir()]
+    for folder in sorted(folders, reverse=True):
+        if not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _unpack(site: Path, architecture: Architecture, python: str, *wheels: Path) -> None:
     places = (f"--find-links={folder}" for folder in wheels)
     wanted = (_requirement(place) for place in DISTRIBUTIONS)
-    told = ("--no-index", "--no-compile", "--no-warn-conflicts", *architecture.of_pip)
+    told = ("--no-index", "--no-compile", "--no-warn-conflicts", *architecture.of_pip(python))
     call(*PIP, "install", "--target", site, *told, *places, *wanted)
 
 
@@ -116,9 +159,6 @@ def _venv(root: Path) -> None:
     _write(root / PREFIX / "pyvenv.cfg", PYVENV)
     programs = root / PREFIX / "bin"
     _write(programs / "nondum", LAUNCHER, 0o755)
-    (programs / f"python{PYTHON}").symlink_to(f"/usr/bin/python{PYTHON}")
-    for name in ("python", "python3"):
-        (programs / name).symlink_to(f"python{PYTHON}")
     (root / "usr/bin").mkdir(parents=True)
     (root / "usr/bin/nondum").symlink_to(f"/{PREFIX}/bin/nondum")
 

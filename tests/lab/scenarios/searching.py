@@ -27,9 +27,8 @@ from demo.search.three_hosts import (
 )
 from demo.stage import PLAN_S, Stage
 from tests.lab.lab import Lab
-from tests.lab.recipe import RECIPES, X86_64
+from tests.lab.recipe import ARCHITECTURES, X86_64
 from tests.lab.robot import MachineRobot
-from tests.lab.software import PYTHON
 
 MUCH = 10_000
 """Rows: all of a journal."""
@@ -55,12 +54,12 @@ def run(lab: Lab) -> str:
     small robot is of the run's architecture, with 2 GB as the others."""
     kit = search_kit(
         lab.work / "sources",
-        target=Target((PYTHON,), tuple(RECIPES)),
+        target=Target((lab.built.recipe.python,), tuple(ARCHITECTURES)),
         settings={**SETTINGS, **SLOW},
     )
     person = Person(lab.work / "person", expects=(ALERT, *OTHER_SENTENCES))
     payloads = {kit.drives[name].name: id for name, id in kit.payloads.items()}
-    others = dict.fromkeys((ROBOT, NODE), X86_64.name)
+    others = dict.fromkeys((ROBOT, NODE), X86_64.architecture)
     hosts = lab.fleet(ROBOT, NODE, SMALL, memory_mb=2048, of=others)
     robots = {name: MachineRobot(host, payloads) for name, host in hosts.items()}
     node, robot, small = robots[NODE], robots[ROBOT], robots[SMALL]
