@@ -56,6 +56,14 @@ _OF_PAYLOADS = tuple(
 )
 """What a payload's life is made of."""
 
+_OF_MACHINES = (
+    "packaging",
+    *(f"{HOST}/{name}" for name in ("sources", "sandbox", "service", "people", "peers")),
+    "plugins/host-lamps/nondum_host_lamps",
+    "tests/lab",
+)
+"""What only a whole machine shows."""
+
 _ALL = (
     Campaign(
         "faults",
@@ -109,15 +117,18 @@ _ALL = (
     ),
     Campaign(
         "machines",
-        "Every scenario of the laboratory on emulated x86_64 machines",
-        (
-            "packaging",
-            *(f"{HOST}/{name}" for name in ("sources", "sandbox", "service", "people", "peers")),
-            "plugins/host-lamps/nondum_host_lamps",
-            "tests/lab",
-        ),
+        "Every scenario of the laboratory on emulated x86_64 machines with Debian 12",
+        _OF_MACHINES,
         "tests.lab",
         ("--jobs", "2"),
+        needs=("lab",),
+    ),
+    Campaign(
+        "debian-13",
+        "A yanked stick, the package and the first demonstration on machines with Debian 13",
+        _OF_MACHINES,
+        "tests.lab",
+        ("--suite", "trixie", "--jobs", "2", "yank", "package", "following"),
         needs=("lab",),
     ),
     Campaign(
