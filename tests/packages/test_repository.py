@@ -78,7 +78,7 @@ def test_apt_refuses_what_its_maker_did_not_sign(
 
 
 class Apt:
-    """This machine's, with a state folder and one source of its own."""
+    """This machine's, with a separate state folder and one source."""
 
     def __init__(self, root: Path, repository: Path) -> None:
         self.root = root
