@@ -32,10 +32,13 @@ ADAPTERS = {
 }
 
 
-def kit(lab: Lab, names: Sequence[str], settings: Mapping[str, str]) -> Kit:
-    """Build payloads for the lab's machines; `settings` are lines of plugins' settings, by name."""
+def kit(
+    lab: Lab, names: Sequence[str], settings: Mapping[str, str], *, later: Sequence[str] = ()
+) -> Kit:
+    """Build payloads for the lab's machines, and for Pythons that these will have later; `settings`
+    are lines of plugins' settings, by name."""
     folders = {name: set_up(name, lab.work / "sources", text) for name, text in settings.items()}
-    target = Target((lab.built.recipe.python,), (lab.built.recipe.architecture,))
+    target = Target((lab.built.recipe.python, *later), (lab.built.recipe.architecture,))
     return Kit.built(names, libraries=LIBRARIES, folders=folders, target=target)
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from tests.daemon.plugins import talker
 from tests.lab.debs import OLD, debs
+from tests.lab.demonstration import kit
+from tests.lab.drives import fat_stick
 from tests.lab.installed import Installed
 from tests.lab.lab import Lab
 from tests.lab.newer_python import SUITE, newer_python
+from tests.lab.recipe import PYTHONS
+from tests.lab.robot import MachineRobot
 
-PAYLOAD = "org.example.talker"
+PLUGIN, PAYLOAD = "mobile-base", "org.nondum.mobile-base"
 UPGRADING_S = 1500.0
 """Thirty packages, their modules compiled by an emulated processor."""
 RUNS_BY = "readlink /proc/$(systemctl show -P MainPID nondum.service)/exe"
 
 
 def run(lab: Lab) -> str:
-    """A machine of Debian 12, a payload that is active, then apt with files of Debian 13."""
+    """A machine of Debian 12, a payload with machine code for both Pythons, then apt with files of
+    Debian 13."""
     if lab.built.recipe.suite == SUITE:
         return "nothing newer is known"
     machine = lab.bare(debs(lab.built), newer_python(lab.built))
@@ -27,7 +31,10 @@ def run(lab: Lab) -> str:
     host.configure()
     machine.run("systemctl restart nondum.service", timeout_s=UPGRADING_S)
     host.wait_until_started()
-    stick = host.bring(lab.stick("talker", talker()), PAYLOAD)
+    made = kit(lab, [PLUGIN], {}, later=[PYTHONS[SUITE]])
+    MachineRobot(host, {}).trust(made.trust)
+    image = fat_stick(lab.folder() / "stick.img", made.drives[PLUGIN])
+    stick = host.bring(image, PAYLOAD)
     before = machine.run(RUNS_BY).strip()
     machine.run(f"{_APT} apt-get -q -y install /mnt/python/*.deb", timeout_s=UPGRADING_S)
     host.wait_until_started()
