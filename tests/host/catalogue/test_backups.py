@@ -160,6 +160,22 @@ async def test_older_nondum_leaves_alone_what_it_cannot_go_back_from(
     assert revision(tmp_path / "catalogue.sqlite") == 9
 
 
+async def test_damaged_catalogue_of_an_older_nondum_is_made_of_the_copy_from_before_the_upgrade(
+    tmp_path: Path,
+) -> None:
+    """The other backups are the newer one's, and know the newest releases."""
+    file = tmp_path / "catalogue.sqlite"
+    await written(tmp_path, knowing(3, lamp=1))
+    with newer_nondum():
+        await written(tmp_path, knowing(9, lamp=4))
+        Backups(file).make()
+    file.write_bytes(b"\0" * 10_000)
+    catalogue = await Catalogue.open(file, "spot")
+    await catalogue.close()
+    assert catalogue.state == knowing(3, lamp=4)
+    assert catalogue.loss is not None and catalogue.loss.instead is Instead.BACKUP
+
+
 async def test_only_the_copy_of_the_last_upgrade_is_kept(tmp_path: Path) -> None:
     kept = Backups(tmp_path / "catalogue.sqlite")
     await written(tmp_path, knowing(3))

@@ -85,7 +85,7 @@ class Backups:
 
     def found(self) -> Iterator[Path]:
         """Those that are there and whole, the newest first."""
-        for path in (self.newest, self.before):
+        for path in (self.newest, self.before, *self.folder.glob(f"{OF_SCHEMA}*")):
             if path.exists() and is_whole(path):
                 yield path
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sqlite3
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 
@@ -72,9 +74,9 @@ def open_file(path: Path, host: str) -> Opened:
         raise ConfigRefused(_unwritable(path, error)) from error
 
 
-def set_aside(path: Path, why: str = "damaged") -> Path | None:
+def set_aside(path: Path) -> Path | None:
     """Move a file that is of no use out of the way, with its log; where to, if it is there."""
-    aside = path.with_name(f"{path.name}.{why}-{time.time_ns()}")
+    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
     moved = False
     for suffix in ("", "-wal", "-shm"):
         with contextlib.suppress(FileNotFoundError):
@@ -113,10 +115,14 @@ def _opened(
 
 
 def _instead(path: Path, host: str, backups: Backups) -> Opened:
-    aside = set_aside(path)
+    aside, newest = set_aside(path), dict[str, Highwater]()
     for backup in backups.found():
         backups.restore(backup)
-        opened = _opened(path, host, backups)
+        try:
+            opened = _opened(path, host, backups, newest)
+        except ConfigRefused:  # of a newer nondum, which was here before this one
+            newest = newest or database.newest_releases(path) or newest
+            opened = None
         if opened is not None:
             loss = Loss(aside, Instead.BACKUP, opened.state.revision)
             return Opened(opened.connection, opened.state, loss)
@@ -126,20 +132,25 @@ def _instead(path: Path, host: str, backups: Backups) -> Opened:
 
 def _former(path: Path, host: str, backups: Backups, refused: ConfigRefused) -> Opened:
     """The copy of this schema, which knows the newest releases all the same: what was withdrawn or
-    replaced under the newer nondum does not come back with the older one.
+    replaced under the newer nondum does not come back with the older one. Killed at any moment, one
+    of both files is there, whole.
 
     Raises `refused` if there is no such copy, or those cannot be read.
     """
     backup, newest = backups.of_schema(database.SCHEMA), database.newest_releases(path)
     if newest is None or not (backup.exists() and is_whole(backup)):
         raise refused
-    aside = set_aside(path, "newer")
-    backups.restore(backup)
-    opened = _opened(path, host, backups, newest)
-    if opened is None:
-        raise refused
-    loss = Loss(aside, Instead.FORMER, opened.state.revision)
-    return Opened(opened.connection, opened.state, loss)
+    unfinished = path.with_name(f".{path.name}.part")
+    unfinished.unlink(missing_ok=True)
+    disk.write(unfinished, backup.read_bytes())
+    connection, _ = database.opened(unfinished, host, newest=newest)
+    connection.close()  # its log is in it now, as the newer one's is since it was read
+    aside = path.with_name(f"{path.name}.newer-{time.time_ns()}")
+    os.link(path, aside)
+    unfinished.rename(path)
+    disk.sync(path.parent)
+    opened = Opened(*database.opened(path, host))
+    return replace(opened, loss=Loss(aside, Instead.FORMER, opened.state.revision))
 
 
 def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:

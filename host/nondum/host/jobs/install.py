@@ -143,13 +143,15 @@ def without_wheels(arguments: Arguments, report: Report) -> list[str]:
     """Keys of those of the payload folders given whose wheels for this host are not all here: they
     were copied for another Python."""
     facts = look.facts_of(arguments)
-    staged = (look.load_staged(Path(f)) for f in arguments["folders"])
-    return [one.folder.name for one in staged if _lacks(arguments, one, facts)]
+    folders = map(Path, arguments["folders"])
+    return [folder.name for folder in folders if _lacks(arguments, folder, facts)]
 
 
-def _lacks(arguments: Arguments, staged: StagedPayload, facts: HostFacts) -> bool:
-    wheels = _wheels_for(staged, facts)
-    if wheels is None:
+def _lacks(arguments: Arguments, folder: Path, facts: HostFacts) -> bool:
+    try:
+        staged = look.load_staged(folder)
+        wheels = look.chosen(staged, facts)
+    except (PayloadRefused, OSError):
         return True
     known = look.known_wheels(arguments, staged, facts)
     return any(w.sha256 not in known and not (staged.folder / w.path).exists() for w in wheels)

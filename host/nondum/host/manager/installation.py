@@ -120,9 +120,12 @@ class Installation:
         if not (others := of_another_python(state) - gone):
             return gone
         folders = [str(self._folders.payload(key)) for key in sorted(others)]
-        return gone.union(
-            await self._children.run("without_wheels", self._arguments(folders=folders))
-        )
+        try:
+            lacking = await self._children.run("without_wheels", self._arguments(folders=folders))
+        except NondumError as error:  # then each is found out when it is brought up
+            log.warning("wheels for this Python are not looked for: %s", error)
+            return gone
+        return gone.union(lacking)
 
     async def prepare(self, state: HostState) -> None:
         """Clear away what a recovered state does not account for. What cannot be is left."""
