@@ -204,6 +204,9 @@ def test_hostile_packets_are_refused(data: bytes, code: str) -> None:
     [
         pytest.param({"a": "x" * MAX_PACKET}, "PACKET_TOO_LONG", id="too-long"),
         pytest.param({"a": [0] * 10_001}, "PACKET_TOO_LONG", id="too-many-items"),
+        pytest.param(
+            {"a": {str(n): 0 for n in range(10_001)}}, "PACKET_TOO_LONG", id="too-many-keys"
+        ),
         pytest.param({"a": nested(MAX_DEPTH)}, "PACKET_TOO_DEEP", id="too-deep"),
         pytest.param(nested_tables(MAX_DEPTH), "PACKET_TOO_DEEP", id="tables-too-deep"),
         pytest.param({"a": float("nan")}, "PACKET_VALUE", id="nan"),

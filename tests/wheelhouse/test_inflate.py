@@ -55,8 +55,11 @@ def test_bytes_behind_the_stream_are_refused(library: Any, tail: bytes) -> None:
 @either_library
 def test_no_more_is_fed_behind_the_stream(library: Any) -> None:
     packed = memoryview(deflated(b"some") + bytes(MEGABYTE))
+    fed = list(pieces(packed, 0, len(packed)))
+    left = iter(fed)
     with pytest.raises(ValueError, match=r"\bbytes\b"):
-        list(inflated(pieces(packed, 0, len(packed)), library))
+        list(inflated(left, library))
+    assert len(fed) - len(list(left)) == 2, "the one in which it ends, and the one seen to be more"
 
 
 @either_library
