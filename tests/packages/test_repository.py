@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-
-from nondum_deb import repository
+from tests.packages.conftest import ROOT
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, ("apt-get", "apt-ftparchive", "gpg", "dpkg-deb"))),
     reason="apt, apt-utils, gpg or dpkg are not here",
 )
 MAKER = "maker@example.org"
+WRITE = """
+import sys
+from pathlib import Path
+from nondum_deb import repository
+repository.write(Path(sys.argv[1]), sys.argv[2])
+"""
 CONTROL = """\
 Package: nondum
 Version: {version}
@@ -35,6 +42,13 @@ def keys(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPat
     return home
 
 
+def write(place: Path) -> None:
+    """As the builder does, which is no distribution that is installed."""
+    command = [sys.executable, "-P", "-c", WRITE, place, MAKER]
+    surroundings = {**os.environ, "PYTHONPATH": str(ROOT / "packaging/debian")}
+    subprocess.run(command, env=surroundings, check=True)
+
+
 @pytest.fixture
 def folder(tmp_path: Path, keys: Path) -> Path:
     """A repository with two versions of a package."""
@@ -46,7 +60,7 @@ def folder(tmp_path: Path, keys: Path) -> Path:
         (tree / "DEBIAN/control").write_text(CONTROL.format(version=version, maker=MAKER))
         deb = place / f"nondum_{version}_all.deb"
         subprocess.run(["dpkg-deb", "--build", tree, deb], check=True, capture_output=True)
-    repository.write(place, MAKER)
+    write(place)
     return place
 
 
@@ -61,7 +75,7 @@ def test_apt_finds_and_fetches_each_version(folder: Path, tmp_path: Path) -> Non
 
 def test_it_can_be_written_again(folder: Path, tmp_path: Path) -> None:
     (folder / "nondum_0.2.0_all.deb").unlink()
-    repository.write(folder, MAKER)
+    write(folder)
     apt = Apt(tmp_path / "apt", folder)
     assert apt.does("update")
     assert apt.does("download", "nondum=0.1.0")
