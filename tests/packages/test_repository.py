@@ -44,7 +44,7 @@ def keys(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPat
 
 def write(place: Path) -> None:
     """As the builder does, which is no distribution that is installed."""
-    command = [sys.executable, "-P", "-c", WRITE, place, MAKER]
+    command = [sys.executable, "-P", "-c", WRITE, str(place), MAKER]
     surroundings = {**os.environ, "PYTHONPATH": str(ROOT / "packaging/debian")}
     subprocess.run(command, env=surroundings, check=True)
 
