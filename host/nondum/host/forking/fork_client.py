@@ -172,11 +172,11 @@ class ForkClient:
 
     async def close(self) -> None:
         """End the server, and all that it forked."""
+        async with self._turn:  # `_rest` may be ending it just now
+            await self._end()
         if self._resting is not None:
             self._resting.cancel()
             await asyncio.wait([self._resting])
-        async with self._turn:
-            await self._end()
 
     async def _rest(self, stays: Callable[[], bool]) -> None:
         """End the server once it is not used any more."""
