@@ -8,12 +8,12 @@ import os
 import shutil
 import sqlite3
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
 import pytest
 from tests.faults.ways import LAMP_ID, newer, sound
-from tests.kit.host import LAMP, host_in_process, left_over
+from tests.kit.host import LAMP, HostInProcess, host_in_process, left_over
 from tests.kit.payloads import Part, make_payload, make_wheel
 
 from nondum.host.catalogue.reserve import RESERVE_BYTES
@@ -52,6 +52,18 @@ def mounted(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
 @pytest.fixture
 def small_disk(mounted: Callable[[str], Path]) -> Path:
     return mounted(f"size={TINY_MB}m")
+
+
+@contextlib.asynccontextmanager
+async def host_with_both(root: Path) -> AsyncIterator[HostInProcess]:
+    """A host for which one payload is installed for good, `torch`, and another is on a drive."""
+    installed = make_payload(root / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
+    sound(root / "drive")
+    async with host_in_process(root) as host:
+        await install(installed, host.catalogue, host.bus)
+        host.plug(root / "drive")
+        await host.until_step(LAMP_ID, Step.ACTIVE)
+        yield host
 
 
 def fill(file: Path) -> None:
@@ -189,12 +201,7 @@ async def test_all_that_is_here_outlives_the_catalogue(
     tmp_path: Path, harm: str, has_backup: bool
 ) -> None:
     """One payload is installed for good, another on a drive."""
-    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
-    sound(tmp_path / "drive")
-    async with host_in_process(tmp_path) as host:
-        await install(installed, host.catalogue, host.bus)
-        host.plug(tmp_path / "drive")
-        await host.until_step(LAMP_ID, Step.ACTIVE)
+    async with host_with_both(tmp_path) as host:
         if has_backup:
             host.catalogue.backups.make()
     shutil.rmtree(tmp_path / "usb")
@@ -231,19 +238,15 @@ async def test_older_release_is_refused_by_a_rebuilt_catalogue(tmp_path: Path) -
 
 async def test_files_that_were_taken_away_are_told(tmp_path: Path) -> None:
     """A guest comes back from its drive; what was installed for good must be installed again."""
-    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
-    sound(tmp_path / "drive")
-    async with host_in_process(tmp_path) as host:
-        await install(installed, host.catalogue, host.bus)
-        host.plug(tmp_path / "drive")
-        await host.until_step(LAMP_ID, Step.ACTIVE)
+    async with host_with_both(tmp_path) as host:
+        pass
     shutil.rmtree(host.folders.payloads)
     async with host_in_process(tmp_path) as host:
         await host.until_step(LAMP_ID, Step.ACTIVE)
         record = await host.until_step(TORCH_ID, Step.QUARANTINED)
         assert [problem.code for problem in record.problems] == ["PAYLOAD_LOST"]
         await uninstall(TORCH_ID, host.catalogue, host.bus)
-        await install(installed, host.catalogue, host.bus)
+        await install(tmp_path / "usb/nondum" / TORCH_ID, host.catalogue, host.bus)
         await host.until_step(TORCH_ID, Step.ACTIVE)
 
 
@@ -252,12 +255,8 @@ async def test_another_python_has_what_was_made_for_the_one_before_made_again(
     tmp_path: Path, has_wheels: bool
 ) -> None:
     """A guest is read again from its drive where the store has no wheels for this Python."""
-    installed = make_payload(tmp_path / "usb", Part("torch", LAMP), payload_id=TORCH_ID)
-    sound(tmp_path / "drive")
-    async with host_in_process(tmp_path) as host:
-        await install(installed, host.catalogue, host.bus)
-        host.plug(tmp_path / "drive")
-        await host.until_step(LAMP_ID, Step.ACTIVE)
+    async with host_with_both(tmp_path) as host:
+        pass
     with contextlib.closing(sqlite3.connect(host.folders.catalogue)) as catalogue, catalogue:
         other = "replace(site_packages, '/lib/python3.', '/lib/python2.')"
         catalogue.execute(f"UPDATE components SET site_packages = {other}")

@@ -104,7 +104,7 @@ class Apt:
         )
 
     def does(self, *words: str) -> bool:
-        """Whether it does what it is told."""
+        """Run apt-get; whether it succeeded."""
         options = {
             "Dir::State": self.root,
             "Dir::State::lists": self.root / "lists",

@@ -32,6 +32,8 @@ def main(words: Sequence[str]) -> int:
         if asked.lock:
             lock.write()
             return 0
+        if asked.repository:
+            repository.see_to_it(asked.repository)
         wanted = [ARCHITECTURES[name] for name in asked.arch or [_default()]]
         versions = asked.version or [debian(places.version())]
         with tempfile.TemporaryDirectory(prefix="nondum-own-") as own:

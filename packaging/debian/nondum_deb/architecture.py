@@ -24,8 +24,8 @@ class Architecture:
         return (*new, f"manylinux2014_{self.machine}")
 
     def of_pip(self, python: str) -> tuple[str, ...]:
-        """How pip is told to deal in wheels for it and for a Python (`3.12`), whatever this
-        machine's are."""
+        """pip's options for wheels of this architecture and of a Python (`3.12`), whichever the
+        machine has that pip runs on."""
         version = ("--python-version", python, "--implementation", "cp")
         platforms = (f"--platform={name}" for name in self.platforms)
         return ("--only-binary=:all:", *version, *platforms)

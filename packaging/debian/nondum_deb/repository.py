@@ -5,10 +5,11 @@ apt-ftparchive writes what is in it, gpg signs that.
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from nondum_deb.architecture import ARCHITECTURES
-from nondum_deb.command import call
+from nondum_deb.command import BuildFailed, call
 
 KEY = "nondum.asc"
 """The public key, in the form that `Signed-By` of a source takes."""
@@ -18,6 +19,13 @@ OF_RELEASE = {
     "Suite": "stable",
     "Architectures": " ".join(ARCHITECTURES),
 }
+
+
+def see_to_it(key: str) -> None:
+    """Raises `BuildFailed` where a repository could not be written: before a package is built."""
+    if shutil.which("apt-ftparchive") is None:
+        raise BuildFailed("apt-ftparchive is not there: apt-get install apt-utils")
+    call("gpg", "--batch", "--list-secret-keys", key)
 
 
 def write(folder: Path, key: str) -> Path:

@@ -160,8 +160,9 @@ async def test_older_nondum_leaves_alone_what_it_cannot_go_back_from(
     assert revision(tmp_path / "catalogue.sqlite") == 9
 
 
+@pytest.mark.parametrize("has_copy", [True, False])
 async def test_damaged_catalogue_of_an_older_nondum_is_made_of_the_copy_from_before_the_upgrade(
-    tmp_path: Path,
+    tmp_path: Path, has_copy: bool
 ) -> None:
     """The other backups are the newer one's, and know the newest releases."""
     file = tmp_path / "catalogue.sqlite"
@@ -170,10 +171,13 @@ async def test_damaged_catalogue_of_an_older_nondum_is_made_of_the_copy_from_bef
         await written(tmp_path, knowing(9, lamp=4))
         Backups(file).make()
     file.write_bytes(b"\0" * 10_000)
+    if not has_copy:
+        Backups(file).of_schema(database.SCHEMA).unlink()
     catalogue = await Catalogue.open(file, "spot")
     await catalogue.close()
-    assert catalogue.state == knowing(3, lamp=4)
-    assert catalogue.loss is not None and catalogue.loss.instead is Instead.BACKUP
+    assert catalogue.state == knowing(3 if has_copy else 0, lamp=4)
+    assert catalogue.loss is not None
+    assert catalogue.loss.instead is (Instead.BACKUP if has_copy else Instead.NOTHING)
 
 
 async def test_only_the_copy_of_the_last_upgrade_is_kept(tmp_path: Path) -> None:

@@ -127,7 +127,7 @@ def _instead(path: Path, host: str, backups: Backups) -> Opened:
             loss = Loss(aside, Instead.BACKUP, opened.state.revision)
             return Opened(opened.connection, opened.state, loss)
         set_aside(path)
-    return Opened(database.connect(path), HostState(host), Loss(aside, Instead.NOTHING))
+    return Opened(*database.opened(path, host, newest=newest), Loss(aside, Instead.NOTHING))
 
 
 def _former(path: Path, host: str, backups: Backups, refused: ConfigRefused) -> Opened:
