@@ -157,7 +157,7 @@ def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
     """What is told of a loss; `installed` are the payloads that were found in their folders."""
     came = "is gone" if loss.aside is None else "was damaged"
     if loss.instead is Instead.FORMER:
-        came = "is a newer nondum's"
+        came = "was a newer nondum's"
     instead = _INSTEAD[loss.instead].format(loss.revision)
     found = f"; found again: {', '.join(installed)}" if installed else ""
     return Problem(
@@ -171,7 +171,7 @@ def problem_of(loss: Loss, installed: tuple[str, ...]) -> Problem:
 
 _INSTEAD = {
     Instead.BACKUP: "a copy of revision {} took its place, and drives are read again",
-    Instead.FORMER: "the copy of before the upgrade (revision {}) took its place, and drives are "
+    Instead.FORMER: "the copy from before the upgrade (revision {}) took its place, and drives are "
     "read again",
     Instead.MEMORY: "what the running daemon knew (revision {}) was written to a new one",
     Instead.NOTHING: "there was no copy of it, so a new one was begun, and drives are read again",
